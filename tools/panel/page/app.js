@@ -4,6 +4,7 @@
 import {connect, on, state, tell} from './link.js';
 import {h, announce} from './dom.js';
 import {enter, isShown, parse} from './place.js';
+import {TimeLine} from './timeline.js';
 
 const views = {
     overview: ['Overview', () => import('./overview.js')],
@@ -63,8 +64,9 @@ function problemOf({server, reason, machine, responding, instance}) {
 }
 
 /// What the banner says of a machine whose values are valid, but whose functions do not run.
-function pauseOf({server, machine, running, instance}) {
+function pauseOf({server, machine, running, instance, past}) {
     if (server !== 'up' || !machine || running) return '';
+    if (past) return 'The machine was stopped at this moment: its functions did not run.';
     return `Machine '${
         instance}' is stopped: its functions do not run. To start it: hal shell start`;
 }
@@ -79,7 +81,8 @@ function drawFaults({machine, faults}) {
 }
 
 /// What this page may do.
-function roleOf({write, held, token, holder}) {
+function roleOf({write, held, token, holder, past}) {
+    if (past) return 'the past: read-only';
     if (!write) return 'read-only';
     if (held) return 'in control';
     if (!token) return 'read-only: no token';
@@ -88,7 +91,9 @@ function roleOf({write, held, token, holder}) {
 
 let lastBanner = '';
 function drawState() {
-    document.getElementById('machine').textContent = state.instance || 'Halcyon';
+    document.getElementById('machine').textContent =
+        state.past?.timeline?.file || state.instance || 'Halcyon';
+    document.body.classList.toggle('past', state.past !== null);
     const problem = problemOf(state), pause = problem === '' ? pauseOf(state) : '';
     const banner = document.getElementById('banner');
     banner.hidden = problem === '' && pause === '';
@@ -100,14 +105,16 @@ function drawState() {
     if (problem === '' && lastBanner !== '') announce(`Machine '${state.instance}' is running`);
     lastBanner = problem;
     const button = document.getElementById('control');
-    button.hidden = !(state.write && state.token);
+    button.hidden = !(state.write && state.token) || state.past !== null;
     button.textContent = state.held ? 'Release control' : 'Take control';
     document.getElementById('role').textContent = roleOf(state);
 }
 
 document.getElementById('control').addEventListener(
     'click', () => tell(state.held ? {release: true} : {take: true}));
+new TimeLine(document.getElementById('past'));
 on('state', drawState);
+on('marks', drawState);
 on('welcome', () => {
     drawNav();
     if (state.panel && (location.hash === '' || location.hash === '#/overview') &&

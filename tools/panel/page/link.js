@@ -28,6 +28,7 @@ export const state = {
     held: false,
     holder: null,
     panel: null,
+    past: null,      // {timeline, moment} of a replayed machine, docs/protocol.md; null: it is live
     recordings: [],  // {name, notes, columns, seconds}: what hal panel can show besides the machine
     reason: '',
     log: [],
@@ -112,6 +113,12 @@ export async function readRecording(index, names, act) {
     if (reply.ok) awaited.set(reply.probe, act);
     return reply;
 }
+/// Reads names around the moment of a replayed machine, in the same way.
+export async function readAround(names, before_ms, after_ms, act) {
+    const reply = await request({around: names, before_ms, after_ms});
+    if (reply.ok) awaited.set(reply.probe, act);
+    return reply;
+}
 async function startProbe(one) {
     if (!state.machine || one.names.length === 0) return;
     const reply = await request({probe: one.names, ...one.options});
@@ -150,20 +157,50 @@ function machine(event) {
             running_ns: 0,
             faults: 0
         });
+    state.past = event.up && event.hello.replay ? {timeline: null, moment: null} : null;
     lastReply = performance.now();
     emit('state');
-    note({
-        kind: 'machine',
-        unix_ms: Date.now(),
-        text: event.up ? `machine '${state.instance}' is running, process ${state.pid}` :
-                         `machine '${state.instance}' is lost`
-    });
+    if (!event.hello?.replay)
+        note({
+            kind: 'machine',
+            unix_ms: Date.now(),
+            text: event.up ? `machine '${state.instance}' is running, process ${state.pid}` :
+                             `machine '${state.instance}' is lost`
+        });
     if (!event.up) return;
     for (const one of subscriptions)
         start(one);
     for (const one of probes)
         startProbe(one);
     emit('machine');
+    readStatus(0);
+    if (state.past) followMoment();
+}
+
+/// Reads the time line of a replayed machine; its events follow.
+async function followMoment() {
+    const reply = await request({moment: true});
+    if (!reply.ok || !state.past) return;
+    state.past = {timeline: reply.timeline, moment: reply.moment};
+    emit('marks');
+    moveTo(reply.moment);
+}
+
+/// The edits before the moment: the machine has other names behind the next one.
+function editsBefore({timeline, moment}) {
+    const isBefore = mark => mark.cycles <= (moment.cycles ?? 0);
+    return timeline.marks.filter(mark => mark.kind !== 'fault' && isBefore(mark)).length;
+}
+
+let knownEdits = -1;
+function moveTo(moment) {
+    state.past.moment = moment;
+    emit('moment');
+    if (moment.moving) return;
+    emit('logged');
+    const edits = editsBefore(state.past);
+    if (edits !== knownEdits) emit('machine');
+    knownEdits = edits;
     readStatus(0);
 }
 
@@ -214,6 +251,14 @@ function receive(text) {
         case 'layout':
             for (const one of probes)
                 if (one.number === message.probe) Object.assign(one.layout, message);
+            break;
+        case 'moment':
+            if (state.past?.timeline) moveTo(message);
+            break;
+        case 'mark':
+            if (!state.past?.timeline) break;
+            state.past.timeline.marks.push(message);
+            emit('marks');
             break;
         case 'log':
             note(message);
@@ -290,7 +335,8 @@ async function readStatus(time_ns) {
     if (again) readStatus(again);
 }
 
-function noteStatus({running, faults}, time_ns) {
+function noteStatus({running: runs, faults}, time_ns) {
+    const running = state.past ? state.past.moment?.running ?? true : runs;
     if (running === state.running && faults === state.faults) return;
     if (running !== state.running) state.running_ns = time_ns;
     Object.assign(state, {running, faults});

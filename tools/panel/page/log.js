@@ -3,8 +3,13 @@
 import {on, request, state} from './link.js';
 import {h} from './dom.js';
 import {remember} from './place.js';
+import {timeText} from './timeline_moves.js';
 
 const kinds = ['fault', 'write', 'edit', 'command', 'message', 'client', 'panel', 'machine'];
+const kindOfMark = {
+    start: 'command',
+    stop: 'command'
+};
 const maxLines = 500;
 
 /**
@@ -79,11 +84,24 @@ export class View {
                  kind);
     }
 
+    /// What happened in a journal up to the moment.
+    happened() {
+        const {timeline, moment} = state.past;
+        return (timeline?.marks ?? [])
+            .filter(mark => mark.cycles <= (moment?.cycles ?? 0))
+            .map(({kind, text, time_ns}) => ({
+                     kind: kind in kindOfMark ? kindOfMark[kind] : kind,
+                     text: `${text} (${timeText(time_ns)})`,
+                     unix_ms: (timeline.unix_ns + time_ns) / 1e6
+                 }));
+    }
+
     /// The lines to show, newest first. The machine's own faults replace those of the server.
     lines() {
         const word = this.filter.value.toLowerCase();
         const own = state.log.filter(one => one.kind !== 'fault' || this.faults.length === 0);
-        return [...own, ...this.faults]
+        const all = state.past ? this.happened() : [...own, ...this.faults];
+        return all
             .filter(one => !this.hidden.has(one.kind) && one.text.toLowerCase().includes(word))
             .sort((a, b) => b.unix_ms - a.unix_ms)
             .slice(0, maxLines);
@@ -94,7 +112,9 @@ export class View {
         this.list.replaceChildren(...lines.map(element));
         if (lines.length === 0)
             this.list.append(
-                h('li', {class: 'dim'}, 'Nothing happened since this page was opened.'));
+                h('li', {class: 'dim'},
+                  state.past ? 'Nothing happened before this moment.' :
+                               'Nothing happened since this page was opened.'));
     }
 
     async readFaults() {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The scope: up to 16 channels, time base, trigger, cursors, measurements. Samples come from a
 // probe, every cycle of their threads; from a machine without probes, by subscription.
-import {on, probe, readRecording, state, subscribe} from './link.js';
+import {on, probe, readAround, readRecording, state, subscribe} from './link.js';
 import {announce, colour, dark, h, number, pictureInterval, surface, text} from './dom.js';
 import {compareNames, similar} from './names.js';
 import {objects} from './objects.js';
@@ -17,6 +17,7 @@ import {SpectrumPane} from './scope_spectrum_pane.js';
 import {stepResponse} from './scope_step.js';
 import {XyPane} from './scope_xy_pane.js';
 import {remember} from './place.js';
+import {timeText} from './timeline_moves.js';
 import {nice} from './widget_values.js';
 
 const most = 16, divisions = 10, rows = 8, before = .2;
@@ -105,6 +106,10 @@ export class View {
         this.selected = 0;
         this.dragging = null;  // 'press', 'move', 'scroll', or the number of a cursor
 
+        this.isOpen = true;
+        /** @type {string[]} */
+        this.around = null;  // names to be read around the moment of a replayed machine
+        this.isReading = false;
         this.store = new Store();
         this.run = true;
         this.single = false;  // a single record is shown
@@ -195,7 +200,8 @@ export class View {
                    this.suggest();
                    this.follow();
                }),
-            on('state', () => this.noteState()), on('logged', () => {
+            on('moment', () => this.followMoment()), on('state', () => this.noteState()),
+            on('logged', () => {
                 this.knownFaults = null;
                 this.surface.request();
             })
@@ -203,6 +209,7 @@ export class View {
     }
 
     end() {
+        this.isOpen = false;
         clearInterval(this.measuring);
         dark.removeEventListener('change', this.redraw);
         this.following++;
@@ -234,6 +241,7 @@ export class View {
             value => {
                 this.base = Number(value);
                 this.save();
+                if (state.past) this.followMoment();
             });
         this.modes = choose('Mode', modes, this.mode, value => {
             Object.assign(this, {mode: value, single: false, shownAt: null, run: true});
@@ -258,7 +266,7 @@ export class View {
             value: String(this.level),
             onchange: () => this.setTrigger({level: Number(this.levelInput.value) || 0})
         });
-        this.levelLabel = h('label', {class: 'tied'}, 'at', this.levelInput);
+        this.levelLabel = h('label', {class: 'tied live'}, 'at', this.levelInput);
         this.acrossSource = choose('X axis of the XY view', [['', 'no XY']], '', value => {
             this.across = value;
             this.showXy();
@@ -275,7 +283,9 @@ export class View {
         this.slider = slider;
         this.back = h('span', {class: 'dim'});
         this.history = h('div', {class: 'history'}, slider, this.back);
-        this.stop = h('button', {class: 'main', onclick: () => this.toggleRun()}, 'Stop');
+        for (const element of [this.modes, this.triggerSource, this.edges, this.faultsOf])
+            element.classList.add('live');
+        this.stop = h('button', {class: 'main live', onclick: () => this.toggleRun()}, 'Stop');
         this.cursorButton =
             h('button',
               {'aria-pressed': String(this.useCursors), onclick: () => this.toggleCursors()},
@@ -332,7 +342,8 @@ export class View {
         const {slider, store} = this, kept = store.newest - store.oldest;
         const behind = Math.max(0, store.newest - this.range()[1]);
         const scrollable = kept - this.base * divisions, isShort = !(scrollable > 0);
-        if (this.history.hidden !== isShort) this.history.hidden = isShort;
+        const isMoment = this.recording === '' && state.past !== null;  // the time line moves it
+        this.history.hidden = isShort || isMoment;
         slider.min = String(Math.min(-1e-3, -scrollable));
         if (document.activeElement !== slider || this.run) slider.value = String(-behind);
         text(this.back, this.run ? `${seconds(kept)} kept` :
@@ -576,6 +587,7 @@ export class View {
         this.stops = [];
         if (list.length === 0) return;
         if (this.recording !== '') return this.showRecording(list, call);
+        if (state.past) return this.showMoment(list);
         let known = 0;
         this.stopFollowing = probe(list, {batch_ms: pictureInterval - 5}, (event, bytes, layout) => {
             if (layout.layout !== known) {
@@ -614,6 +626,45 @@ export class View {
         this.knownFaults = null;
         this.source = `recording ${this.recording}` +
             (left_out > 0 ? `, ${left_out} earlier rows not shown` : '');
+    }
+
+    /// The machine has another moment: reads the samples around it, at most one request at a time.
+    followMoment() {
+        if (this.recording !== '' || state.past?.moment?.moving) return;
+        this.showMoment(this.followed.split(',').filter(name => name));
+    }
+
+    /// Shows channels of a replayed machine around its moment, which is in the middle.
+    async showMoment(names) {
+        this.around = names;
+        if (this.isReading || names.length === 0) return;
+        this.isReading = true;
+        while (this.around && this.isOpen) {
+            const wanted = this.around, half = this.base * divisions / 2;
+            this.around = null;
+            const milliseconds = Math.min(60000, Math.ceil(half * 1000) + 1);
+            await this.readMoment(wanted, milliseconds, half);
+        }
+        this.isReading = false;
+    }
+
+    async readMoment(names, milliseconds, half) {
+        const reply = await readAround(names, milliseconds, milliseconds, (event, bytes) => {
+            if (!this.isOpen || names.join() !== this.followed) return;
+            this.store.layout(reply.groups, names, reply.columns);
+            this.store.unixOffset = reply.unix_ns;
+            this.store.seconds(0);
+            this.store.samples(event, bytes, reply);
+            this.recorded = state.past?.timeline?.marks ?? [];
+            this.knownFaults = null;
+            this.zeroAt = reply.moment_ns / 1e9;
+            this.triggered = true;
+            this.source = `around ${timeText(reply.moment_ns)}` +
+                (reply.left_out > 0 ? `, ${reply.left_out} earlier rows not shown` : '');
+            this.canvas.dataset.moment = String(reply.moment_ns);
+            this.scrollTo(this.zeroAt + half);
+        });
+        if (!reply.ok && !/interrupted/.test(reply.error)) this.report(reply.error);
     }
 
     /// Shows the end of what is kept; when no time base was chosen, all of it.
@@ -687,7 +738,7 @@ export class View {
 
     /// Remembers when the functions did not run.
     noteState() {
-        if (this.recording !== '') return;
+        if (this.recording !== '' || state.past) return;
         const {store, stops} = this, open = stops.find(one => one.to === Infinity);
         const exact = state.running_ns > 0 && store.origin !== null;
         const now = exact ? store.seconds(state.running_ns) : store.newest;
@@ -699,7 +750,7 @@ export class View {
 
     /// Why the newest samples are not those of a running machine; empty when they are.
     notice() {
-        if (this.recording !== '') return '';
+        if (this.recording !== '' || state.past) return '';
         if (!state.machine) return 'machine not running';
         if (!state.responding) return 'machine not responding';
         if (!state.running) return 'stopped: functions do not run';
@@ -709,7 +760,7 @@ export class View {
 
     /// What happened, with a time on the clock of the samples.
     happened() {
-        if (this.recording !== '') return this.recorded;
+        if (this.recording !== '' || state.past) return this.recorded;
         return state.log.filter(one => one.time_ns > 0);
     }
 
@@ -788,6 +839,8 @@ export class View {
             for (const at of this.cursors)
                 picture.vertical(width * at, this.looks.text);
         const [from, to] = this.range(), faults = this.faults();
+        if (this.recording === '' && state.past)
+            picture.vertical(width * (this.zeroAt - from) / (to - from), this.looks.text, true);
         for (const {at} of faults)
             picture.vertical(width * (at - from) / (to - from), this.looks.bad);
         const key = this.labelKey(cssWidth, cssHeight, ratio);
@@ -897,7 +950,7 @@ export class View {
 
     draw() {
         text(this.stop, this.run ? 'Stop' : 'Run');
-        this.stop.disabled = this.recording !== '';
+        this.stop.disabled = this.recording !== '' || state.past !== null;
         this.surface.request();
     }
 
@@ -1044,7 +1097,7 @@ export class View {
         if (this.channels.length === 0) return 'Add a channel: a pin, signal or parameter';
         if (this.source === '') return 'no samples yet';
         const {store} = this, parts = [this.source, `${store.rows} rows`, `${store.lost} lost`];
-        if (!this.run && this.recording === '')
+        if (!this.run && this.recording === '' && !state.past)
             parts.push(this.single ? 'single record' : 'stopped');
         if (this.channels.some(one => store.isCoarse(one.name, this.range()[0])))
             parts.push(`minima and maxima of ${seconds(store.pastWidth)}`);
@@ -1112,6 +1165,7 @@ export class View {
         this.base = steps[Math.min(steps.length - 1, Math.max(0, index))];
         this.timeBase.value = String(this.base);
         this.save();
+        if (state.past) this.followMoment();
     }
 
     /// Returns whether the key means something.

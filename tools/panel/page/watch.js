@@ -170,7 +170,7 @@ export class View {
         this.makeLists();
         const titles = [
             h('th', {}, 'Name'), h('th', {class: 'n'}, 'Value'), h('th', {}, 'Unit'),
-            h('th', {class: 'hide-narrow'}, 'Last 15 s'), h('th', {}, 'Set'),
+            h('th', {class: 'hide-narrow live'}, 'Last 15 s'), h('th', {class: 'live'}, 'Set'),
             h('th', {}, h('span', {class: 'unseen'}, 'Remove'))
         ];
         const table = h('table', {class: 'watch'}, h('thead', {}, h('tr', {}, titles)), this.body);
@@ -182,7 +182,6 @@ export class View {
                   this.removeButton, this.undoButton),
                 this.note, this.problem, h('div', {class: 'scroll'}, table))));
         this.load();
-        this.follow();
         this.pausing = setInterval(() => this.notePause(), period);
         this.subscriptions = [on('machine', () => this.load()), on('state', () => this.enable())];
     }
@@ -275,6 +274,7 @@ export class View {
         if (!this.open) return;
         this.drawTree();
         this.drawRows();
+        this.follow();
     }
 
     leaf(name, label = name) {
@@ -358,8 +358,8 @@ export class View {
             h('td', {class: 'mono', title: object?.doc ?? ''}, name,
               object ? h('span', {class: 'dim hide-narrow'}, ` ${object.type}`) : ''),
             row.value, h('td', {class: 'dim unit'}, object?.unit ?? ''),
-            h('td', {class: 'hide-narrow'}, row.canvas),
-            h('td', {class: 'set-cell'},
+            h('td', {class: 'hide-narrow live'}, row.canvas),
+            h('td', {class: 'set-cell live'},
               object ? setter(
                            name, object, value => this.set(name, value),
                            problem => this.reject(problem)) :
