@@ -173,7 +173,7 @@ class ReplayPanel(Case):
             status, text = self.client.run(*words)
             self.assertEqual(1, status, text)
             self.assertTrue(
-                text.startswith(f"'{words[0]}' is not possible: this is a moment of the past."),
+                text.startswith(f"'{words[0]}' is not possible: this is a moment of the past"),
                 text,
             )
         self.assertEqual((1, "unknown command '\"setp\"'\n"), self.client.run('"setp"', "x", "1"))

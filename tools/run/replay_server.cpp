@@ -24,9 +24,16 @@ constexpr auto scan_slice = std::chrono::milliseconds(200);  // requests that wa
 constexpr auto goto_time = std::chrono::milliseconds(300);  // then a newer one interrupts it
 constexpr std::int64_t max_around_ms = 60'000;
 
-constexpr std::string_view past =
-    "this is a moment of the past. To execute the journal with another value, type: hal replay "
-    "--exact FILE --edit 'setp NAME VALUE' --at CYCLE";
+/// Returns why a command or verb is rejected. `edit`: what executes the journal with another value; ""
+/// when nothing does.
+std::string not_possible(std::string_view what, const std::string& edit) {
+    std::string text = fmt::format("'{}' is not possible: this is a moment of the past", what);
+    if (edit.empty()) return text;
+    return text + fmt::format(
+                      ". To execute the journal with another value, type: hal replay --exact FILE "
+                      "--edit '{}' --at CYCLE",
+                      edit);
+}
 
 std::vector<std::string> split(const std::string& line) {
     std::istringstream in(line.substr(0, line.find('#')));
@@ -35,6 +42,14 @@ std::vector<std::string> split(const std::string& line) {
         words.push_back(word);
     }
     return words;
+}
+
+std::string joined(const std::vector<std::string>& words) {
+    std::string line;
+    for (const std::string& word : words) {
+        line += (line.empty() ? "" : " ") + word;
+    }
+    return line;
 }
 
 /// Returns the strings of an array; none when it is not such an array.
@@ -213,7 +228,8 @@ void ReplayServer::handle(ReplayClient& client, const std::string& line) {
     }
     work.id = id_text(request);
     if (const std::string_view verb = live_verb(request); !verb.empty()) {
-        return reject(work.client, work.id, fmt::format("'{}' is not possible: {}", verb, past));
+        return reject(work.client, work.id,
+                      not_possible(verb, verb == "set" ? "setp NAME VALUE" : ""));
     }
     if (request.contains("run")) return handle_run(client, request, std::move(work));
     if (request.contains("around")) return read_rows(request, std::move(work));
@@ -254,8 +270,9 @@ void ReplayServer::handle_run(ReplayClient& client, const Json& request, Work wo
     const CommandRow* const row = find_command(words[0]);
     if (!row) return reply_command(work, false, fmt::format("unknown command '{}'\n", words[0]));
     if (!row->is_query() && !row->is_apart()) {
+        const bool has_edit = words[0] == "setp" || words[0] == "sets";
         return reply_command(work, false,
-                             fmt::format("'{}' is not possible: {}\n", words[0], past));
+                             not_possible(words[0], has_edit ? joined(words) : "") + "\n");
     }
     Json forwarded{{"run", words}};
     if (const auto id = request.find("id"); id != request.end()) {
@@ -310,10 +327,7 @@ void ReplayServer::unsubscribe(ReplayClient& client, const Json& request, const 
 }
 
 void ReplayServer::read_rows(const Json& request, Work work) {
-    std::string names;
-    for (const std::string& name : strings_of(request["around"])) {
-        names += (names.empty() ? "" : " ") + name;
-    }
+    const std::string names = joined(strings_of(request["around"]));
     const auto milliseconds = [&request](const char* member) {
         const auto given = request.find(member);
         if (given == request.end() || !given->is_number_integer()) return std::int64_t{500};

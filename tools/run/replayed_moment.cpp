@@ -218,8 +218,10 @@ void ReplayedMoment::run(const ValueCondition& condition) {
 }
 
 void ReplayedMoment::step(std::uint64_t count, const std::string& thread) {
-    while (count > 0 && next()) {
-        if (thread.empty() || machine_.execution().newest().thread == thread) {
+    const std::uint64_t target = cycles() + count;  // an edit may execute several cycles
+    const auto goes_on = [&] { return thread.empty() ? cycles() < target : count > 0; };
+    while (goes_on() && next()) {
+        if (machine_.execution().newest().thread == thread) {
             --count;
         }
     }
