@@ -45,8 +45,9 @@ class TimeLine(Case):
         for kind in ("rawKeyDown", "keyUp"):
             self.browser.call("Input.dispatchKeyEvent", type=kind, key=key, code=key)
 
-    def shell_values(self, cycle, names):
-        lines = [f"goto {cycle}"]
+    def shell_values(self, names):
+        """The values in the replay shell after as many cycles."""
+        lines = [f"step {self.moment()['cycles']}"]
         for name in names:
             lines.append(f"{'gets' if '.' not in name else 'getp'} {name}")
         done = self.run_program(
@@ -79,9 +80,9 @@ class TimeLine(Case):
             clickCount=1,
         )
 
-    def compare_watch(self, cycle):
+    def compare_watch(self):
         read = "document.querySelector('[data-value=\"{}\"]').textContent.trim()"
-        for name, value in zip(NAMES, self.shell_values(cycle, NAMES)):
+        for name, value in zip(NAMES, self.shell_values(NAMES)):
             self.browser.wait(f"{read.format(name)} !== '–'")
             shown = self.browser.evaluate(read.format(name))
             if value in ("TRUE", "FALSE"):
@@ -102,7 +103,7 @@ class TimeLine(Case):
                 f"Math.abs(window.halcyon.past.moment.time_ns - {wanted}) < {0.01 * end_ns + 2e7}"
             )
             moment = self.moment()
-            self.compare_watch(moment["fastest_cycle"])
+            self.compare_watch()
             position = self.browser.evaluate("document.querySelector('.thumb').style.left")
             self.assertAlmostEqual(
                 100 * moment["time_ns"] / end_ns, float(position.rstrip("%")), delta=0.01
@@ -130,14 +131,14 @@ class TimeLine(Case):
         self.settled(
             "window.halcyon.past.moment.time_ns >= 1e9 || window.halcyon.past.moment.ended"
         )
-        self.compare_watch(self.moment()["fastest_cycle"])
+        self.compare_watch()
         self.key("End")
         self.settled(f"window.halcyon.past.moment.time_ns === {self.timeline['end_ns']}")
 
         fault = next(one for one in self.timeline["marks"] if one["kind"] == "fault")
         self.click("fault-back")
         self.settled(f"window.halcyon.past.moment.cycles === {fault['cycles']}")
-        self.compare_watch(self.moment()["fastest_cycle"])
+        self.compare_watch()
         self.click("fault-back")
         note = "document.getElementById('moment-note').textContent"
         self.browser.wait(f"{note} === 'no earlier fault'")
@@ -179,7 +180,7 @@ class TimeLine(Case):
         self.open("graph?pin=sine")
         self.click("fault-next")
         self.settled(f"window.halcyon.past.moment.cycles === {fault['cycles']}")
-        (sine,) = self.shell_values(self.moment()["fastest_cycle"], ["sine"])
+        (sine,) = self.shell_values(["sine"])
         shown = "Number(document.querySelector('[data-live=sine]')?.textContent)"
         self.browser.wait(f"{shown} === {float(sine)}")
 

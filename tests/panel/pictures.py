@@ -14,6 +14,7 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tests/cli"))
 from harness import wait_until  # noqa: E402
 from panel_page import Page, main  # noqa: E402
+from past_panel import journal_incident, start_past  # noqa: E402
 from web import start_panel  # noqa: E402
 
 ATTEMPTS, WIDTH = 40, 1080
@@ -94,6 +95,21 @@ class Pictures(Page):
         self.say("setp", "furuta.push", "1")
         time.sleep(2.5)
         self.save("swing-up")
+
+    def test_timeline(self):
+        journal_incident(self)
+        self.process, self.port = start_past(self)
+        self.browser = self.kind(self)
+        self.browser.size(WIDTH, 620)
+        self.browser.open(
+            f"http://localhost:{self.port}/#/scope?"
+            "ch=sine:0.5:1,smoothed:0.5:1,canopen.0.io.online:1:-3&base=0.05"
+        )
+        self.browser.wait("window.halcyon?.past?.moment?.ended")
+        self.browser.evaluate("document.getElementById('fault-back').click()")
+        self.browser.wait("window.halcyon.past.moment.ended === false")
+        time.sleep(2)
+        self.save("timeline")
 
     def test_scope(self):
         channels = ",".join(f"wave{n}-sine" for n in range(16))

@@ -78,7 +78,7 @@ export class TimeLine {
         this.pause = button('pause', 'Stop the move', '■', () => request({run: ['pause']}));
         this.where = h('b', {id: 'moment', class: 'mono'});
         this.buttons =
-            h('div', {class: 'bar'},
+            h('div', {class: 'moves'},
               button('fault-back', 'Previous fault', '⚑ ◀', () => this.move(['fault', 'previous'])),
               button(
                   'reverse', 'Reverse: back to where the condition begins to hold', '◀◀',
