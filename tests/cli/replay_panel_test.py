@@ -9,8 +9,8 @@ import struct
 import sys
 import unittest
 
-from harness import SANITIZED, Case, wait_until
-from past_panel import Client, journal_incident, start_past
+from harness import SANITIZED, SERVO, Case, wait_until
+from past_panel import Client, journal_incident, start_past, wait_for_cycles
 from web import PANEL, WebSocket
 
 SHOWN = ["show pin canopen", "show pin smooth", "show sig", "show thread", "show fault"]
@@ -233,6 +233,21 @@ class ReplayPanel(Case):
         self.assertEqual(end["cycles"] - 10, self.client.ask(moment=True)["moment"]["cycles"])
         self.client.run("step", "99")
         self.assertEqual(end["cycles"], self.client.ask(moment=True)["moment"]["cycles"])
+
+    def test_without_keyframes_going_back_executes_the_journal_from_its_begin(self):
+        netlist = SERVO + "loadrt witness file=seen.txt\naddf witness.0 servo\n"
+        machine = self.start("run", self.write("a.hal", netlist), "--journal", "run.mcap")
+        wait_for_cycles(self, 200)
+        self.end(machine)
+        self.begin("--anyway")
+        self.assertIn("no keyframes", (self.folder / "past.err").read_text())
+        self.assertFalse(self.moment["copied"])
+        for cycle in (150, 40, 90):
+            self.assertEqual(0, self.client.run("goto", str(cycle))[0])
+            moment = self.client.ask(moment=True)["moment"]
+            self.assertEqual((cycle, False), (moment["fastest_cycle"], moment["copied"]))
+            self.assertGreater(moment["took_ms"], 0)
+            self.assertEqual(5, self.client.ask(read=["witness.0.out"])["values"][0])
 
     def test_it_begins_at_the_given_moment_and_ends_with_its_panel(self):
         journal_incident(self)
