@@ -227,7 +227,8 @@ export class TimeLine {
         if (this.problem) parts.push(this.problem);
         const moment = past?.moment;
         if (moment?.moving) parts.push(`executing the journal: ${timeText(moment.time_ns)}`);
-        if (moment?.state) parts.push(moment.state.trim());
+        const why = moment?.state?.trim() ?? '';
+        if (why && why !== 'interrupted') parts.push(why);
         if (moment && moment.copied === false && moment.took_ms !== undefined)
             parts.push(
                 'without keyframes: going back executes the journal from its begin; the last ' +
