@@ -291,6 +291,8 @@ constexpr bus::EventRow<Event> event_rows[] = {
      "readable, or the ring is broken; it is not started: check its cables, or {no_dc}"},
     {Event::dc_lost, Effect::raises, "{who}[ {clock}]",
      " is out of step, its clock deviates by {us}{outputs_off}"},
+    {Event::dc_far, Effect::raises, "{who}[ {clock}]",
+     " is out of step, its clock deviates by more than 2.1 s{outputs_off}"},
     {Event::dc_recovered, Effect::ends,
      "{who} has a clock within the window again, after {second} ms"},
     {Event::dc_synchronised, Effect::none,
@@ -380,9 +382,15 @@ std::string domain(const Source& s) {
     return number < s.setup.domains.size() ? s.setup.domains[number].name : std::to_string(number);
 }
 
+/// 092Ch has 31 bits for it; a larger deviation is shown as this one.
+std::string deviation(std::int64_t ns) {
+    constexpr std::int64_t largest_ns = 0x7fff'ffff;
+    return ns < largest_ns ? microseconds(ns) : "more than 2.1 s";
+}
+
 std::string lost_clock(const Source& s) {
-    const std::string distance = microseconds(s.first()) + " from the reference clock, more than " +
-                                 microseconds(s.second());
+    const std::string distance =
+        deviation(s.first()) + " from the reference clock, more than " + microseconds(s.second());
     if (s.setup.dc_loss == master::DcLoss::safeop) {
         return "has a clock that deviates by " + distance +
                "; it is taken to SAFE-OP until its clock is within the window again: check that "
@@ -390,7 +398,8 @@ std::string lost_clock(const Source& s) {
     }
     return "is operational, but its clock deviates by " + distance +
            "; check that the thread misses no cycles, and its manual for what it does without "
-           "synchronisation";
+           "synchronisation. When all slaves behind the reference clock deviate alike, that clock "
+           "has jumped. To set the clocks again: stop, then start";
 }
 
 std::string staleness(const Source& s) {
@@ -440,7 +449,7 @@ constexpr Value values[] = {
     {"other_state", [](const Source& s) { return state_words(s.second()); }},
     {"al_status", [](const Source& s) { return al_words(s.second()); }},
     {"configured", [](const Source& s) { return configured_words(s.second(), s.slave()); }},
-    {"deviation", [](const Source& s) { return microseconds(s.first()); }},
+    {"deviation", [](const Source& s) { return deviation(s.first()); }},
     {"window", [](const Source& s) { return microseconds(s.second()); }},
     {"domain", domain},
     {"counter", [](const Source& s) { return std::to_string(s.first() & 0xffff); }},
@@ -502,7 +511,7 @@ constexpr Value values[] = {
      [](const Source& s) {
     return std::string(s.setup.dc_loss == master::DcLoss::safeop
                            ? "; its outputs are off until it is in step again"
-                           : "");
+                           : "; to set its clock again: stop, then start");
 }},
 };
 

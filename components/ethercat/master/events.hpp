@@ -57,7 +57,9 @@ enum class Event : std::uint8_t {
     dc_not_set,  ///< the time of its clock could not be set [ms waited, -]
     /// clock far beyond the window while operational [deviation ns, window ns]
     dc_lost,
-    /// clock in the window again after dc_lost [deviation ns, ms it was beyond it]
+    /// as dc_lost, by the largest deviation that the register holds [deviation ns, window ns]
+    dc_far,
+    /// clock in the window again after dc_lost or dc_far [deviation ns, ms it was beyond it]
     dc_recovered,
     dc_synchronised,  ///< all slaves [largest deviation ns, -]
     ring_broken,

@@ -367,6 +367,9 @@ static Task<void> resynchronise(Channel& c, Bus& bus, Device& d) noexcept {
                (c.now_ns() - d.began_ns) / millisecond);
 }
 
+/// 092Ch has 31 bits for it; a larger deviation is shown as this one.
+static constexpr std::int64_t largest_deviation_ns = 0x7fff'ffff;
+
 /// Reports a slave that is not in step for some time although it is in OP, and stops it where the
 /// setup requires it; reports it when it is again.
 static void check_clock(Bus& bus, Device& d, std::int64_t now_ns) noexcept {
@@ -386,7 +389,8 @@ static void check_clock(Bus& bus, Device& d, std::int64_t now_ns) noexcept {
             return;
         }
         d.drifted = true;
-        bus.report(Event::dc_lost, d, deviation, window);
+        bus.report(deviation < largest_deviation_ns ? Event::dc_lost : Event::dc_far, d, deviation,
+                   window);
         if (bus.setup.dc_loss == DcLoss::safeop) {
             bus.run(d, [&] { return resynchronise(d.channel, bus, d); });
         }

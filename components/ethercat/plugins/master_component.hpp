@@ -473,7 +473,7 @@ private:
         if (event == Event::fell_back) {
             begin(slave_faults_[slave], event, slave, second);
         }
-        if (event == Event::dc_lost) {
+        if (event == Event::dc_lost || event == Event::dc_far) {
             begin(clock_faults_[slave], event, slave, first);
         }
         if (event == Event::data_stale) {

@@ -70,7 +70,11 @@ TEST(EthercatEventWords, Objects_and_aborts_are_written_as_in_the_standard) {
               "slave 4 (x-axis) is operational, but its clock deviates by 123 us from the "
               "reference clock, "
               "more than 10 us; check that the thread misses no cycles, and its manual for what it "
-              "does without synchronisation");
+              "does without synchronisation. When all slaves behind the reference clock deviate "
+              "alike, that clock has jumped. To set the clocks again: stop, then start");
+    EXPECT_NE(words(Event::dc_far, 1, 0x7fff'ffff, 10'000)
+                  .find("its clock deviates by more than 2.1 s from the reference clock"),
+              std::string::npos);
     EXPECT_EQ(words(Event::dc_tolerated, 1, 3'000, 1'000),
               "slave 4 (x-axis) deviates by 3 us from the reference clock, more than the window of "
               "1 us; it is started, because 10 us are tolerable: check the cycle of the thread, or "
@@ -202,7 +206,13 @@ TEST(EthercatEventWords, Faults_are_of_the_rows_of_the_sentences) {
     EXPECT_EQ(text(Event::start_up_failed, 1), "slave 1 (y) did not start; it is tried again");
     EXPECT_EQ(text(Event::fell_back, 1),
               "slave 1 (y) left its state with AL status code {x}; its outputs are off");
-    EXPECT_EQ(text(Event::dc_lost, 1), "slave 1 (y) is out of step, its clock deviates by {} us");
+    EXPECT_EQ(
+        text(Event::dc_lost, 1),
+        "slave 1 (y) is out of step, its clock deviates by {} us; to set its clock again: stop, "
+        "then start");
+    EXPECT_EQ(text(Event::dc_far, 1),
+              "slave 1 (y) is out of step, its clock deviates by more than 2.1 s; to set its clock "
+              "again: stop, then start");
     EXPECT_EQ(text(Event::unknown_slave, Events::of_position + 3),
               "a slave on eth:enp3s0 is not in the configuration");
     EXPECT_EQ(text(Event::link_lost, Events::bus),
