@@ -90,7 +90,7 @@ class Client:
         self.socket.connect(str(case.folder / "halcyon" / f"{instance}.sock"))
         case.addCleanup(self.socket.close)
         self.stream = self.socket.makefile("rb")
-        self.number, self.events = 0, []
+        self.number, self.events, self.replies = 0, [], {}
         self.hello = self.read()
 
     def read(self):
@@ -108,12 +108,25 @@ class Client:
         return self.number
 
     def reply(self, number):
-        while (message := self.read()).get("id") != number:
-            self.events.append(message)
-        return message
+        """The reply to a request; others, which may come before it, are kept."""
+        while number not in self.replies:
+            message = self.read()
+            if "event" in message:
+                self.events.append(message)
+            else:
+                self.replies[message["id"]] = message
+        return self.replies.pop(number)
 
     def ask(self, **request):
         return self.reply(self.send(**request))
+
+    def ask_at_once(self, requests):
+        """Sends all requests in one piece; their replies."""
+        first = self.number + 1
+        lines = [json.dumps({"id": first + i, **request}) for i, request in enumerate(requests)]
+        self.number += len(lines)
+        self.socket.sendall("".join(line + "\n" for line in lines).encode())
+        return [self.reply(number) for number in range(first, self.number + 1)]
 
     def run(self, *words):
         reply = self.ask(run=list(words))

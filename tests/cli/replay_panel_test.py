@@ -41,7 +41,7 @@ class ReplayPanel(Case):
         self.begin()
         dice = random.Random(4)
         last = self.moment["fastest_cycle"]
-        cycles = [dice.randrange(1, last) for _ in range(4)] + [1, last]
+        cycles = [dice.randrange(1, last) for _ in range(2)] + [1, last]
         for cycle in cycles:
             lines = [f"goto {cycle}", *SHOWN]
             texts = [self.client.run(*line.split()) for line in lines]
@@ -110,10 +110,9 @@ class ReplayPanel(Case):
         journal_incident(self)
         self.begin()
         last = self.moment["fastest_cycle"]
-        numbers = [self.client.send(run=["goto", str(last - 5 * i)]) for i in range(60)]
-        replies = [self.client.reply(number) for number in numbers]
+        replies = self.client.ask_at_once({"run": ["goto", str(last - 5 * i)]} for i in range(60))
         replaced = [one for one in replies if one["err"] == "replaced by a newer goto\n"]
-        self.assertGreater(len(replaced), 30)
+        self.assertEqual(59, len(replaced))
         self.assertEqual(0, replies[-1]["status"])
         self.assertEqual(last - 5 * 59, self.client.ask(moment=True)["moment"]["fastest_cycle"])
 
@@ -242,7 +241,8 @@ class ReplayPanel(Case):
         self.begin("--anyway")
         self.assertIn("no keyframes", (self.folder / "past.err").read_text())
         self.assertFalse(self.moment["copied"])
-        for cycle in (150, 40, 90):
+        last = self.moment["fastest_cycle"]
+        for cycle in (last - 20, last - 90, last - 50):
             self.assertEqual(0, self.client.run("goto", str(cycle))[0])
             moment = self.client.ask(moment=True)["moment"]
             self.assertEqual((cycle, False), (moment["fastest_cycle"], moment["copied"]))
