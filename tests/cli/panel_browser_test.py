@@ -671,6 +671,10 @@ start
         self.good("shell", "setp", "canopen-jr3.0.fz", "-220")
         self.browser.wait(cell.format("force", "emcy") + " === 'FF01h device specific'")
         self.browser.wait("document.querySelectorAll('.station.faulty').length === 1")
+        self.browser.size(1080, 800)  # the emergency wraps, and no column is cut off
+        self.browser.wait(
+            "(s => s.scrollWidth <= s.clientWidth)(document.querySelector('.scroll'))"
+        )
         self.good("shell", "setp", "canopen-io.0.power", "FALSE")
         self.browser.wait(
             cell.format("io", "online")
