@@ -16,7 +16,7 @@ PACKAGES = {
         ],  # pictures of examples
         "fields": {
             "Recommends": "libpam-modules, python3",
-            "Suggests": "halcyon-dev, halcyon-doc, can-utils",
+            "Suggests": "halcyon-dev, halcyon-doc, can-utils, graphviz",
         },
         "summary": "real-time dataflow runtime in the manner of LinuxCNC's HAL",
         "text": "Control components are wired together by netlist files and run in real-time\nthreads; a shell inspects and rewires the running machine. CANopen, EtherCAT\n"
