@@ -2,7 +2,9 @@
 # SPDX-License-Identifier: MIT
 """The Debian packages: lintian, installation in a clean Debian 12, a machine there as an ordinary user, removal. Needs root and a mirror.
 
-HALCYON_PACKAGES: a folder with packages to test, instead of making them. HALCYON_CHROOT: a tar archive of Debian 12 to start from."""
+HALCYON_PACKAGES: a folder with packages to test, instead of making them. HALCYON_CHROOT: a tar archive of Debian 12 to start from.
+"""
+
 import os
 import re
 import shutil
@@ -131,7 +133,9 @@ class Chroot(unittest.TestCase):
             self.assertTrue(seen.get(name, "").startswith(package), (name, seen.get(name)))
 
     def test_installs_runs_as_an_ordinary_user_and_is_removed(self):
-        self.good("apt-get update")
+        updated = self.inside("apt-get -o APT::Update::Error-Mode=any update")
+        if updated.returncode != 0:
+            self.skipTest(f"needs a mirror of Debian: {updated.stderr.strip()[-300:]}")
         self.good("apt-get install -y --no-install-recommends adduser libcap2-bin iproute2 procps")
         # What the packages depend on, so that what remains after their removal is compared with that.
         self.good(
@@ -277,7 +281,8 @@ class Chroot(unittest.TestCase):
             self.assertIn(f"\n{key}\n", unit)
         command = re.search(r"ExecStart=(.*)", unit)[1]
         self.assertEqual(
-            "/usr/bin/hal run --no-picture --name %i --group realtime $HAL_OPTIONS machine.hal", command
+            "/usr/bin/hal run --no-picture --name %i --group realtime $HAL_OPTIONS machine.hal",
+            command,
         )
         if shutil.which("systemd-analyze"):
             units = self.root / "lib/systemd/system"
