@@ -367,8 +367,9 @@ private:
     }
 
     /// Returns whether an event of a row that ends the fault does so now: `running` after a loss,
-    /// the others while the slots may be used. [realtime]
+    /// the carrier its own fault, the others while the slots may be used. [realtime]
     bool ends(Event e) const noexcept {
+        if (e == Event::carrier && is_carrier_fault_) return true;
         if (e != Event::running) return station_->ready();
         return withdrawn_ ||
                station_->status().count.losses + station_->status().count.unanswered != 0;
@@ -386,6 +387,9 @@ private:
         if (const auto* const fault = segment_faults_->of(e, who)) {
             pins_.fault = true;
             hal::LastingFault& of = e == Event::other_master ? second_master_fault_ : fault_;
+            if (&of == &fault_) {
+                is_carrier_fault_ = e == Event::no_carrier;
+            }
             begin(of, fault->text, fault->detail(value));
         }
         reporter_->event(e, who, value);
@@ -433,6 +437,7 @@ private:
     bool was_synchronised_ = false;
     bool withdrawn_ = false;
     bool had_carrier_ = true;
+    bool is_carrier_fault_ = false;  // fault_ is of a carrier that was lost
 };
 
 }  // namespace
