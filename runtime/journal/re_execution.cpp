@@ -125,9 +125,11 @@ bool ReExecution::step() {
 /// or the first one needs an edit.
 ReExecution::Cursor* ReExecution::next(bool& needs_edit, bool in_edit) {
     std::vector<Cursor*> waiting;
+    bool waits_in_call = false;
     for (auto& [number, cursor] : cursors_) {
         if (cursor.suspended) {
             if (cursor.ticket == (cursor.in_call ? next_call_ : next_ticket_)) return &cursor;
+            waits_in_call = waits_in_call || cursor.in_call;
         } else if (cursor.thread && cursor.thread->record() && !cursor.ended) {
             waiting.push_back(&cursor);
         }
@@ -141,6 +143,8 @@ ReExecution::Cursor* ReExecution::next(bool& needs_edit, bool in_edit) {
         needs_edit = true;
         if (!in_edit) return nullptr;
     }
+    // the call before it may be one of the session, in start() or stop() of the next edit
+    needs_edit = needs_edit || (waits_in_call && entry_ < file_.entries().size());
     return accepts_differences_ ? stalled_call() : nullptr;
 }
 
@@ -215,11 +219,22 @@ void ReExecution::finish_cycle(Cursor& cursor) {
     load(cursor);
 }
 
+void ReExecution::finish() {
+    finished_ = true;
+    for (auto& [number, cursor] : cursors_) {
+        if (!cursor.suspended) continue;
+        Core::set_current(cursor.core);
+        cursor.stack->resume();
+        Core::set_current(nullptr);
+        cursor.suspended = false;
+    }
+}
+
 /// Called by a cycle before and after a function that shares state.
 void ReExecution::wait_for(std::uint64_t ticket, bool covered) {
-    if (!running_) return;  // the machine ends, with the cycle suspended
+    if (!running_) return;
     Cursor& cursor = *running_;
-    while (ticket > next_ticket_) {
+    while (ticket > next_ticket_ && !finished_) {
         cursor.ticket = ticket;
         cursor.stack->leave();
     }
@@ -231,7 +246,7 @@ void ReExecution::wait_for(std::uint64_t ticket, bool covered) {
 void ReExecution::wait_for_call(std::uint64_t ticket) {
     if (!running_) return;
     Cursor& cursor = *running_;
-    while (ticket > next_call_) {
+    while (ticket > next_call_ && !finished_) {
         cursor.ticket = ticket;
         cursor.in_call = true;
         cursor.stack->leave();
@@ -452,20 +467,16 @@ bool ReExecution::breaks_off() const {
 ReExecution::State ReExecution::end_of_journal() {
     for (const auto& [number, cursor] : cursors_) {
         if (!cursor.thread || !cursor.thread->record() || cursor.ended) continue;
+        std::string_view why = "reads a cycle of another thread that is not in the journal";
         if (cursor.suspended) {
-            reason_ = fmt::format(
-                "thread '{}': a function of its cycle {} waits for one of "
-                "another thread that is not in the journal",
-                cursor.thread->name, cursor.thread->record()->number);
-            return State::ends;
+            why = cursor.in_call ? "waits in a call on a bus for a call that is not in the journal"
+                                 : "waits for a function of another thread that is not in the "
+                                   "journal";
         }
-        reason_ = fmt::format(
-            "thread '{}': its cycle {} reads a cycle of another thread that is "
-            "not in the journal",
-            cursor.thread->name, cursor.thread->record()->number);
-        return State::ends;
+        reason_ += fmt::format("{}thread '{}': its cycle {} {}", reason_.empty() ? "" : "; ",
+                               cursor.thread->name, cursor.thread->record()->number, why);
     }
-    return State::complete;
+    return reason_.empty() ? State::complete : State::ends;
 }
 
 // --- the edits ---

@@ -54,8 +54,9 @@ public:
     };
     /// Executes the next cycle and the edits before it.
     State advance();
-    /// Nothing more is executed, although the journal may have more: the machine may end.
-    void finish() { finished_ = true; }
+    /// Nothing more is executed, although the journal may have more. Runs the suspended cycles to
+    /// their end, so that none holds a bus that the end of the machine waits for.
+    void finish();
     State state() const { return state_; }
     /// Returns why the execution cannot go on, as sentences.
     const std::string& reason() const { return reason_; }

@@ -26,6 +26,16 @@ addf canopen-drive.0.update fast
 addf can-faults.0.update fast
 """
 
+# Its thread is in a call on the bus most of the time.
+BUSY_BUS = """loadrt threads name1=servo period1=100000
+loadrt can_traffic names=a,b,c,d link=sim:busy one_node=1 id=0x200 messages=20
+addf a.update servo
+addf b.update servo
+addf c.update servo
+addf d.update servo
+start
+"""
+
 DRIVE = """loadrt threads name1=servo period1=1000000
 loadrt canopen_drive link={bus} id=2
 addf canopen-drive.0.update servo
@@ -106,6 +116,24 @@ class ExactReplayOfBuses(Case):
         text = self.replay()
         self.assertRegex(text, r"\nno difference, \d{5,} values compared\n$")
         self.assertGreater(int(re.match(r"(\d+) cycles of 2 threads", text)[1]), 2000)
+
+    def test_a_bus_in_memory_is_opened_and_closed_while_a_thread_uses_it(self):
+        self.load_cpus()
+        machine = self.start(
+            "run", self.write("a.hal", BUSY_BUS), "--journal", "run.mcap", "--values", "*"
+        )
+        self.wait_for_cycles("servo", 100)
+        pull = """loadrt can_faults link=sim:busy victim=0
+addf can-faults.0.update servo
+setp can-faults.0.cut TRUE
+unloadrt can_faults
+"""
+        self.good("shell", given=pull * 60)
+        self.wait_for_cycles("servo", 100)
+        self.finish(machine)
+        text = self.replay()
+        self.assertRegex(text, r"\nno difference, \d{4,} values compared\n$")
+        self.assertRegex(text, r"^\d+ cycles of 1 thread, \d{3} edits")
 
     @unittest.skipIf(SANITIZED, "a sanitizer has the functions of the clock and of files")
     def test_a_master_whose_node_is_killed(self):
