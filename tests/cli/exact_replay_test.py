@@ -295,6 +295,10 @@ class ExactReplay(Case):
             (1, "hal replay: --record: no cycle was executed\n"), (done.returncode, done.stderr)
         )
         self.assertFalse((self.folder / "out.csv").exists())
+        self.assertRegex(
+            self.replay(),
+            r"^0 cycles of 0 threads, 0 edits and 0 s executed in \S+ s; the journal has no cycles\nno difference\n$",
+        )
 
     def test_no_option_replaces_the_journal_itself(self):
         self.finish(self.run_journaled(SERVO + "start\n"))

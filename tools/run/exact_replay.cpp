@@ -110,11 +110,9 @@ private:
         const JournaledCycle& newest = execution_.newest();
         const double real = std::max(std::chrono::duration<double>(took).count(), 1e-9);
         std::string text = fmt::format(
-            "{} of {}, {} and {:.6g} s executed in {:.3g} s; newest: cycle {} of '{}' at {:.6f} "
-            "s\n",
+            "{} of {}, {} and {:.6g} s executed in {:.3g} s; {}\n",
             counted(execution_.cycles(), "cycle"), counted(file_.threads().size(), "thread"),
-            counted(execution_.edits(), "edit"), seconds(newest.time_ns), real, newest.number,
-            newest.thread, seconds(newest.time_ns));
+            counted(execution_.edits(), "edit"), seconds(newest.time_ns), real, newest_cycle());
         note_overlaps();
         const std::string difference = machine_.difference();
         const bool is_cut = !difference.empty() && execution_.is_at_the_cut();
@@ -155,6 +153,18 @@ private:
         }
         if (!print(text)) return 1;
         return good ? 0 : 1;
+    }
+
+    std::string newest_cycle() const {
+        if (execution_.cycles() > 0) {
+            const JournaledCycle& newest = execution_.newest();
+            return fmt::format("newest: cycle {} of '{}' at {:.6f} s", newest.number, newest.thread,
+                               seconds(newest.time_ns));
+        }
+        const bool has_cycles = has_gap() || std::ranges::any_of(file_.threads(), [](auto& entry) {
+            return entry.second.record() != nullptr;
+        });
+        return has_cycles ? "no cycle was executed" : "the journal has no cycles";
     }
 
     void note_overlaps() const {
