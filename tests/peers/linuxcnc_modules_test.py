@@ -324,6 +324,61 @@ start
         wait_until(lambda: self.value("streamer.0.pin.1") == "8", "the last record")
         self.assertEqual("2.5", self.value("streamer.0.pin.0"))
 
+    def journaled(self, text, fed=""):
+        """Runs a machine with a journal for 500 cycles of its thread t; what its re-execution prints."""
+        machine = self.start(
+            "run", self.write("m.hal", text), "--journal", "run.mcap", "--values", "*", loaded=False
+        )
+
+        def cycles():
+            self.assertIsNone(machine.poll())
+            return int(self.value("t.threadbeat") or 0)
+
+        wait_until(lambda: cycles() > 100, "the machine runs")
+        if fed:
+            played = subprocess.run(
+                ["halstreamer", "-c", "0"], input=fed, capture_output=True, text=True, timeout=60
+            )
+            self.assertEqual(0, played.returncode, played.stderr)
+        wait_until(lambda: cycles() > 500, "500 cycles")
+        out, error = self.end(machine)
+        self.assertEqual(0, machine.returncode, out + error)
+        return self.run_program("replay", "--exact", "run.mcap")
+
+    @unittest.skipIf(SANITIZED, "a sanitizer has the functions of the clock")
+    def test_a_journal_has_what_motion_computes(self):
+        done = self.journaled("""loadrt threads name1=t period1=1000000
+loadrt trivkins
+loadrt tpmod
+loadrt homemod
+loadrt motmod num_joints=3
+loadrt --linuxcnc sampler cfg=ff depth=100
+loadrt siggen names=wave
+net position joint.0.motor-pos-cmd => joint.0.motor-pos-fb sampler.0.pin.0
+net sine wave.sine => sampler.0.pin.1
+addf motion-command-handler t
+addf motion-controller t
+addf wave.update t
+addf sampler.0 t
+""")
+        self.assertEqual(0, done.returncode, done.stdout + done.stderr)
+        self.assertRegex(done.stdout, r"^\d{3,} cycles of 2 threads")
+        self.assertRegex(done.stdout, r"\nno difference, \d{5,} values compared\n$")
+
+    @unittest.skipIf(SANITIZED, "a sanitizer has the functions of the clock")
+    def test_a_journal_does_not_have_what_a_program_puts_into_shared_memory(self):
+        done = self.journaled(
+            """loadrt threads name1=t period1=1000000
+loadrt --linuxcnc streamer cfg=fs depth=100
+addf streamer.0 t
+""",
+            fed="1.5 7\n2.5 8\n",
+        )
+        self.assertEqual(1, done.returncode, done.stdout + done.stderr)
+        self.assertRegex(
+            done.stdout, r"(?m)^first difference: 'streamer\.0\.\S+' \('streamer' of streamer, "
+        )
+
     def test_our_halsampler_becomes_the_package_s_for_its_module(self):
         self.write(
             "m.hal",

@@ -42,7 +42,7 @@ typedef struct hal_modules {
 } hal_modules;
 
 /* Extension "hal.module-calls/1", offered while an instance is created: what LinuxCNC's modules do
- * to the machine as a whole. All [setup]. */
+ * to the machine as a whole. [setup] unless stated otherwise. */
 #define HAL_MODULE_CALLS "hal.module-calls/1"
 
 enum { HAL_MODULE_PIN, HAL_MODULE_PARAMETER, HAL_MODULE_SIGNAL };
@@ -71,6 +71,10 @@ typedef struct hal_module_calls {
      * if that is rejected. Returns false if there is nothing of that name. Until destroy
      * returns. */
     bool (*afterwards)(void *machine, const char *command, const char *name, void (*failed)(const char *why));
+    /* Notes a number that nobody computes, such as a counter of the processor, in the journal of
+     * the cycle or setup call that reads it. Returns `value`, or in a re-execution the journaled
+     * one. [any] */
+    int64_t (*reading)(int64_t value);
 } hal_module_calls;
 
 #ifdef __cplusplus

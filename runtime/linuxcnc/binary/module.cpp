@@ -354,6 +354,7 @@ bool Module::create(const hal_host* host, const hal_modules& extension,
     host_ = host;
     extension_ = &extension;
     calls_ = &calls;
+    take_readings(calls);
     machine_ = calls.machine(host);
     if (!fits_the_others()) {
         release();

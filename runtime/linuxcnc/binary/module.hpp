@@ -164,6 +164,9 @@ void take_clock(Module& module, const hal_host* host);
 void release_clock(const Module& module) noexcept;
 /// Before a function of a module with the clock: what is to be added to each period. [realtime]
 void adjust_clock(const Module& module, const hal_cycle& cycle) noexcept;
+/// system.cpp: lets the machine note the cycle counter of the processor where a module reads it.
+/// [setup]
+void take_readings(const hal_module_calls& calls);
 
 /// components.cpp: forgets the ids of a module, and with the last module the memory of
 /// hal_malloc().

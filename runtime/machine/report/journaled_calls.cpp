@@ -33,6 +33,7 @@ std::size_t threads_of_components() noexcept { return created_threads.load(); }
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 
 void hal::prepare_journaled_calls() noexcept {}
+std::int64_t hal::journaled_reading(std::int64_t value) noexcept { return value; }
 
 #else
 
@@ -57,16 +58,16 @@ hal::SetupReader* reader_of_call() noexcept {
 
 bool is_journaled() noexcept { return hal::Core::current() || reader_of_call(); }
 
-std::int64_t journaled(std::int64_t value) noexcept {
-    hal::Core* const core = hal::Core::current();
+}  // namespace
+
+std::int64_t hal::journaled_reading(std::int64_t value) noexcept {
+    Core* const core = hal::Core::current();
     if (!core) {
-        hal::SetupReader* const reader = reader_of_call();
+        SetupReader* const reader = reader_of_call();
         return reader ? reader->reading(value) : value;
     }
     return static_cast<std::int64_t>(core->note_reading(static_cast<std::uint64_t>(value)));
 }
-
-}  // namespace
 
 void hal::prepare_journaled_calls() noexcept {
     (void)*next_clock_gettime;
@@ -85,7 +86,8 @@ extern "C" {
                                                             timespec* to) noexcept {
     const int result = (*next_clock_gettime)(clock, to);
     if (result != 0 || !is_journaled()) return result;
-    *to = hal::to_timespec(journaled(std::int64_t{to->tv_sec} * second_ns + to->tv_nsec));
+    *to = hal::to_timespec(
+        hal::journaled_reading(std::int64_t{to->tv_sec} * second_ns + to->tv_nsec));
     return result;
 }
 
@@ -93,15 +95,16 @@ extern "C" {
     const int result = (*next_gettimeofday)(to, zone);
     if (result != 0 || !is_journaled()) return result;
     constexpr std::int64_t second_us = 1'000'000;
-    const std::int64_t us = journaled(std::int64_t{to->tv_sec} * second_us + to->tv_usec);
+    const std::int64_t us =
+        hal::journaled_reading(std::int64_t{to->tv_sec} * second_us + to->tv_usec);
     to->tv_sec = static_cast<time_t>(us / second_us);
     to->tv_usec = static_cast<suseconds_t>(us % second_us);
     return result;
 }
 
 [[gnu::weak, gnu::visibility("default")]] time_t time(time_t* to) noexcept {
-    const auto now =
-        static_cast<time_t>(journaled(static_cast<std::int64_t>((*next_time)(nullptr))));
+    const auto now = static_cast<time_t>(
+        hal::journaled_reading(static_cast<std::int64_t>((*next_time)(nullptr))));
     if (to) {
         *to = now;
     }
@@ -123,11 +126,11 @@ extern "C" {
 }
 
 [[gnu::weak, gnu::visibility("default")]] int rand() noexcept {
-    return static_cast<int>(journaled((*next_rand)()));
+    return static_cast<int>(hal::journaled_reading((*next_rand)()));
 }
 
 [[gnu::weak, gnu::visibility("default")]] long random() noexcept {
-    return static_cast<long>(journaled((*next_random)()));
+    return static_cast<long>(hal::journaled_reading((*next_random)()));
 }
 
 [[gnu::weak, gnu::visibility("default")]] int pthread_create(pthread_t* thread,

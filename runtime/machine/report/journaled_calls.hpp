@@ -24,6 +24,10 @@ public:
 /// Sets who gets the calls from now on; nullptr: nobody. [setup]
 void set_setup_reader(SetupReader* reader) noexcept;
 
+/// Notes a number that nobody computes, as these calls are noted. Returns `value`, or in a
+/// re-execution the journaled one. With a sanitizer, always `value`. [any]
+std::int64_t journaled_reading(std::int64_t value) noexcept;
+
 /// Finds the functions of the C library before the first cycle. [setup]
 void prepare_journaled_calls() noexcept;
 

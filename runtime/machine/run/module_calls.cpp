@@ -8,6 +8,7 @@
 
 #include "machine/load/construction.hpp"
 #include "machine/load/elaborate.hpp"
+#include "machine/report/journaled_calls.hpp"
 #include "machine/run/running_model.hpp"
 
 namespace hal {
@@ -210,6 +211,7 @@ const hal_module_calls module_calls_extension{sizeof module_calls_extension,
                                               give_base_period,
                                               use_own_threads,
                                               give_machine,
-                                              do_afterwards};
+                                              do_afterwards,
+                                              journaled_reading};
 
 }  // namespace hal
