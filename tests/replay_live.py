@@ -5,7 +5,9 @@
 
 MACHINE is a netlist of halfiles, as canopen-axis/axis.hal; without one all of them that start on this computer. Each runs for the
 time, while two processes load the CPUs, the machine is suspended for moments, values are set, signals, instances and functions
-are added and removed, and a component is reloaded. The exit status is 0 when no bit of any value differs in any cycle.
+are added and removed, a component is reloaded, each bus in memory loses its cable for a moment, and a process is killed: the drive
+of a random netlist, which is started again, or one that the machine has started. The exit status is 0 when no bit of any value
+differs in any cycle.
 """
 
 import argparse
@@ -38,6 +40,20 @@ PARTS = {
     "siggen": ([], ["sine", "cosine", "square"]),
 }
 FUNCTIONS = {"siggen": ".update"}
+# The axis of a random netlist: its drive is a process of its own.
+AXIS = """loadrt canopen config=axis.canopen
+addf canopen.0.receive servo
+addf canopen.0.transmit servo
+net axis-position canopen.0.x.position-actual-value
+net axis-status canopen.0.x.statusword
+"""
+DRIVE = """loadrt threads name1=servo period1=1000000
+loadrt canopen_drive link={bus} id=2
+addf canopen-drive.0.update servo
+start
+"""
+IN_MEMORY = re.compile(r"(?<![\w/])(cane:)?sim:([\w-]+)(/[\w-]+)?")
+ETHERNET = re.compile(r"loadrt (ethercat_segment|tdma)\b|^\[(ethercat|tdma)")
 
 
 def random_netlist(dice):
@@ -62,7 +78,26 @@ def random_netlist(dice):
     lines += [
         f"addf {name} {dice.choice(['fast', 'servo', 'servo', 'slow'])}" for name in functions
     ]
-    return "\n".join([*lines, "start", ""])
+    return "\n".join([*lines, AXIS + "start", ""])
+
+
+def buses_in_memory(folder):
+    """The names of the buses of CAN frames, and of the stations or segments of Ethernet frames."""
+    can, ethernet = set(), set()
+    for path in sorted(folder.iterdir()):
+        if path.suffix not in (".hal", ".ini", ".canopen", ".ethercat"):
+            continue
+        for line in path.read_text().splitlines():
+            for cane, name, station in IN_MEMORY.findall(line.split("#")[0]):
+                is_ethernet = cane or path.suffix == ".ethercat" or ETHERNET.search(line)
+                (ethernet if is_ethernet else can).add(name + station)
+    return sorted(can), sorted(ethernet)
+
+
+def programs_of(pid):
+    """The process IDs of what a process has started."""
+    children = Path(f"/proc/{pid}/task/{pid}/children")
+    return [int(word) for word in children.read_text().split()] if children.exists() else []
 
 
 class Machine:
@@ -71,6 +106,53 @@ class Machine:
         self.environment = environment(hal, str(folder))
         self.words = [hal, "run", netlist, *(["-i", ini] if ini else [])]
         self.process = None
+        self.drive = None
+        self.happened = []
+
+    def start_drive(self):
+        """Starts drive.hal, the node of a random netlist."""
+        if not (self.folder / "drive.hal").exists():
+            return
+        self.drive = subprocess.Popen(
+            [self.hal, "run", "--name", "drive", "drive.hal"],
+            cwd=self.folder,
+            env=self.environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+
+    def kill_node(self):
+        """Kills the drive and starts another one, or kills a process that the machine has started."""
+        if self.drive:
+            self.drive.kill()
+            self.drive.wait()
+            self.start_drive()
+            self.happened.append("its drive killed")
+            return
+        programs = programs_of(self.process.pid)
+        if programs:
+            name = Path(f"/proc/{programs[0]}/comm").read_text().strip()
+            os.kill(programs[0], signal.SIGKILL)
+            self.happened.append(f"the process {name} killed")
+
+    def pull_cables(self, threads):
+        """Cuts each bus in memory for a moment. Unloading reconnects it."""
+        can, ethernet = buses_in_memory(self.folder)
+        pulled = []
+        for name in can:
+            pulled.append(("can_faults", "can-faults", f"link=sim:{name} victim=0", "cut TRUE"))
+        for name in ethernet:
+            fault = "" if "/" in name else "/pulled faults=loss"
+            cut = "cut TRUE" if "/" in name else "babble FALSE"
+            pulled.append(("segment_faults", "segment-faults", f"link=sim:{name}{fault}", cut))
+        for component, prefix, arguments, setting in pulled:
+            lines = [f"loadrt {component} {arguments}", f"addf {prefix}.0.update {threads[0]}"]
+            self.shell("-k", given="\n".join([*lines, f"setp {prefix}.0.{setting}", ""]))
+            time.sleep(0.2)
+            if self.shell("getp", f"{prefix}.0.update.time").strip():
+                self.happened.append(f"{arguments.split()[0][5:]} pulled")
+            self.shell("-k", given=f"unloadrt {component}\n")
 
     def shell(self, *words, given=None):
         done = subprocess.run(
@@ -85,6 +167,8 @@ class Machine:
 
     def start(self, values):
         """Returns why it does not start, or ""."""
+        if not self.drive:
+            self.start_drive()
         self.process = subprocess.Popen(
             [*self.words, "--journal", "run.mcap", *(["--values", "*"] if values else [])],
             cwd=self.folder,
@@ -106,6 +190,10 @@ class Machine:
         return "it has not started in 20 s"
 
     def stop(self):
+        if self.drive:
+            self.drive.kill()
+            self.drive.wait()
+            self.drive = None
         if self.process.poll() is None:
             self.process.send_signal(signal.SIGTERM)
         return self.process.communicate(timeout=60)[1]
@@ -127,6 +215,12 @@ class Machine:
             if part == parts // 2:
                 lines.append("reload sum2")
             self.shell("-k", given="\n".join(lines) + "\n")
+            if part == parts // 4:
+                self.pull_cables(threads)
+            if part == parts * 3 // 4:
+                self.kill_node()
+            if self.process.poll() is not None:
+                return
             os.kill(self.process.pid, signal.SIGSTOP)
             time.sleep(dice.uniform(0.001, 0.03))
             os.kill(self.process.pid, signal.SIGCONT)
@@ -149,7 +243,7 @@ class Machine:
         return done.returncode, done.stdout, done.stderr
 
 
-def verdict(name, machine):
+def verdict(name, machine, error):
     """Prints a line, and returns whether something differs; None: nothing ran."""
     status, out, err = machine.replay()
     same = re.search(r"(?m)^no difference(, (\d+) values? compared)?$", out)
@@ -161,10 +255,12 @@ def verdict(name, machine):
     if status == 0 and same:
         has_values = same[2] not in (None, "0")  # a busy disk may have lost all rows
         what = f"{same[2]} values compared" if has_values else "compared by checksums"
-        print(f"{name}: {count}, {what}, 0 bits differ", flush=True)
+        happened = "".join(f", {one}" for one in machine.happened)
+        print(f"{name}: {count}{happened}, {what}, 0 bits differ", flush=True)
         return False
     lines = [line for line in (out + err).splitlines() if not re.match(r"\d+ cycles", line)]
-    print(f"{name}: {count}, DIFFERS: {' | '.join(lines[:3])}", flush=True)
+    live = [line for line in error.splitlines() if "journal" in line]
+    print(f"{name}: {count}, DIFFERS: {' | '.join([*lines[:3], *live])}", flush=True)
     return True
 
 
@@ -179,7 +275,9 @@ def run_one(hal, name, prepare, options, dice):
             if "--values: " not in why:
                 break
         if why:
-            print(f"{name}: does not start here: {why.splitlines()[-1]}", flush=True)
+            lines = why.splitlines()
+            first = next((line for line in lines if "error" in line), lines[-1])
+            print(f"{name}: does not start here: {first}", flush=True)
             return None
         busy = [subprocess.Popen([sys.executable, "-c", BUSY]) for _ in range(2)]
         try:
@@ -193,7 +291,7 @@ def run_one(hal, name, prepare, options, dice):
             last = (error.strip().splitlines() or ["it wrote nothing"])[-1]
             print(f"{name}: ended without a journal: {last}", flush=True)
             return True
-        differs = verdict(name, machine)
+        differs = verdict(name, machine, error)
         if differs and options.keep:
             shutil.copytree(
                 netlist.parent, Path(options.keep) / name.replace("/", "-"), dirs_exist_ok=True
@@ -211,9 +309,15 @@ def prepare_machine(path):
     return prepare
 
 
-def prepare_text(text):
+def prepare_text(text, dice):
+    group = f"239.{dice.randrange(1, 255)}.{dice.randrange(256)}.{dice.randrange(1, 255)}"
+    bus = f"udp:{group}%lo:{os.getpid() % 40000 + 20000}"
+
     def prepare(folder):
         (folder / "random.hal").write_text(text)
+        (folder / "drive.hal").write_text(DRIVE.format(bus=bus))
+        settings = (HALFILES / "canopen-axis" / "axis.canopen").read_text()
+        (folder / "axis.canopen").write_text(settings.replace("sim:axis", bus))
         return folder / "random.hal", None
 
     return prepare
@@ -240,7 +344,9 @@ def main():
     chosen = [HALFILES / name for name in options.machines]
     machines = chosen or sorted(HALFILES.glob("*/*.hal"))
     todo = [(str(path.relative_to(HALFILES)), prepare_machine(path)) for path in machines]
-    todo += [(f"random {n}", prepare_text(random_netlist(dice))) for n in range(options.random)]
+    todo += [
+        (f"random {n}", prepare_text(random_netlist(dice), dice)) for n in range(options.random)
+    ]
     results = [run_one(hal, name, prepare, options, dice) for name, prepare in todo]
     run = [one for one in results if one is not None]
     print(
