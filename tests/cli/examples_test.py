@@ -45,6 +45,12 @@ class Examples(Case):
         self.assertTrue(text.startswith(f"hal run {MACHINES}/axis/axis.hal --for 100ms\n"), text)
         self.assertIn("cycles", text)
 
+    def test_runs_one_with_the_ini_file_beside_it(self):
+        for name in ("jitter/plain", "jitter/random", "jitter/scocan", "jitter/tdma", "yair/yair"):
+            done = self.run_program("examples", name, "--no-picture", "--for", "0.1s")
+            self.assertIn(f" --ini {ROOT}/halfiles/{name}.ini --no-picture", done.stdout)
+            self.assertEqual((0, ""), (done.returncode, done.stderr), name)
+
     def test_unknown_name(self):
         self.assertEqual(
             "hal examples: unknown example 'furuta/hnag'; did you mean 'furuta/hang'?\n",

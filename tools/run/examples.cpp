@@ -120,6 +120,11 @@ int no_such_example(const Options& options, const std::vector<Example>& examples
 int become_run(const Options& options, const Example& example,
                const std::vector<std::string>& further) {
     std::vector<std::string> words{"hal", "run", example.path};
+    const fs::path ini = fs::path(example.path).replace_extension(".ini");
+    std::error_code ignored;
+    if (fs::is_regular_file(ini, ignored)) {
+        words.insert(words.end(), {"--ini", ini.string()});
+    }
     words.insert(words.end(), further.begin(), further.end());
     if (!print(fmt::format("{}\n", fmt::join(words, " ")))) return 1;
     std::vector<char*> arguments;
