@@ -589,7 +589,8 @@ export class View {
         if (this.recording !== '') return this.showRecording(list, call);
         if (state.past) return this.showMoment(list);
         let known = 0;
-        this.stopFollowing = probe(list, {batch_ms: pictureInterval - 5}, (event, bytes, layout) => {
+        const options = {batch_ms: pictureInterval - 5};
+        this.stopFollowing = probe(list, options, (event, bytes, layout) => {
             if (layout.layout !== known) {
                 known = layout.layout;
                 this.store.layout(layout.groups, list, layout.columns);
