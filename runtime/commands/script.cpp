@@ -87,11 +87,8 @@ void Script::end_text(std::uint32_t source, bool collecting_before, std::size_t 
     }
     const std::size_t errors = effects_.errors();
     if (separately() && errors > 0 && shell_.options.level != Level::nothing) {
-        const char* const without_effect =
-            interrupted_
-                ? "; lines with an error, and those after the interruption, changed nothing"
-                : "; lines with an error changed nothing";
-        output_.err(counted(errors, "error") + without_effect + ", all others took effect\n");
+        output_.err(counted(errors, "error") +
+                    "; lines with an error changed nothing, all others took effect\n");
     }
 }
 
@@ -559,17 +556,12 @@ ScriptOutcome Script::outcome_of(std::size_t edits, bool took_effect, bool faile
 }
 
 bool Script::ended(const Command& command) {
-    const bool ending = session_.ending();
-    if (!ending && !state_.cancelled.load(std::memory_order_relaxed)) return false;
-    if (ending && !pending_.failed()) {
+    if (!session_.ending()) return false;
+    if (!pending_.failed()) {
         report_end(command);
-    } else if (!pending_.failed() && !reported_interruption_) {
-        pending_.error("interrupted", command.span,
-                       "interrupted before '" + command.name.text + "'");
     }
     finish();
     stopped_ = true;
-    interrupted_ = true;
     return true;
 }
 
@@ -581,7 +573,6 @@ void Script::report_end(const Command& command) {
 bool Script::interrupted(Context& context) {
     if (!state_.cancelled.load(std::memory_order_relaxed) && !session_.ending()) return false;
     if (!context.diagnostics.failed()) {
-        reported_interruption_ = true;
         context.diagnostics.error("interrupted", context.command.span,
                                   "'" + context.command.name.text + "' was interrupted");
     }

@@ -87,8 +87,8 @@ private:
     void echo_line(std::string_view line, std::uint32_t number);
     /// Ends the transaction: commits, prints. Sets failed_ and, without -k, stopped_.
     void finish();
-    /// True after Session::interrupt() and Shell::cancel(); then the transaction is rolled back, and
-    /// `command` and those after it are not executed.
+    /// True after Session::interrupt(); then the transaction is rolled back, and `command` and
+    /// those after it are not executed.
     bool ended(const Command& command);
     /// Adds the error that the end of the machine has interrupted `command`.
     void report_end(const Command& command);
@@ -121,8 +121,6 @@ private:
     bool failed_ = false;
     bool stopped_ = false;
     bool ended_ = false;
-    bool interrupted_ = false;  ///< the commands after it were not executed
-    bool reported_interruption_ = false;
 };
 
 }  // namespace hal

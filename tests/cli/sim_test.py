@@ -189,31 +189,6 @@ class Sim(Case):
             re.sub(r"process \d+", "process N", done.stderr.partition("halsampler: ")[0]),
         )
 
-    def test_the_lines_after_an_interruption_do_not_run(self):
-        path = self.write(
-            "a.hal",
-            "newsig a float\nloadusr -w sh started.sh\nnewsig b float\n"
-            "show sig\nloadusr -w touch reached\n",
-        )
-        self.write("started.sh", "touch started\nexec sleep 60\n")
-        for options in ((), ("-k",)):
-            with self.subTest(options=options):
-                machine = self.start("sim", *options, path, loaded=False)
-                wait_until((self.folder / "started").exists, "the program runs")
-                (self.folder / "started").unlink()
-                out, err = self.end(machine, signal.SIGINT)
-                self.assertEqual((1, ""), (machine.returncode, out), err)
-                self.assertIn("a.hal:2:1: error: 'loadusr' was interrupted", err)
-                self.assertNotIn("a.hal:3", err)
-                self.assertNotIn("a.hal:5", err)
-                self.assertFalse((self.folder / "reached").exists())
-                if options:
-                    self.assertIn(
-                        "1 error; lines with an error, and those after the interruption, changed "
-                        "nothing, all others took effect\n",
-                        err,
-                    )
-
     def test_can_be_interrupted(self):
         path = self.write("a.hal", SERVO)
         machine = self.start("sim", path, "--for", "100000000s", "--name", "long", loaded=False)

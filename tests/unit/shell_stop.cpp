@@ -184,23 +184,6 @@ TEST_F(StopTest, an_interrupted_session_ends_the_texts_and_queries_of_clients_ea
     EXPECT_EQ(machine->session.model().find_signal("x0"), nullptr);
 }
 
-TEST_F(StopTest, a_cancelled_text_ends_before_its_next_command) {
-    for (const bool keep_going : {false, true}) {
-        machine->shell.options.keep_going = keep_going;
-        machine->err.clear();
-        machine->shell.cancel();
-        EXPECT_EQ(machine->file("newsig y float\nnewsig z float\n"), 1);
-        machine->shell.cancel(false);
-        EXPECT_NE(machine->err.find("interrupted before 'newsig'"), std::string::npos)
-            << machine->err;
-        EXPECT_EQ(machine->err.find("all others took effect") != std::string::npos, keep_going);
-        EXPECT_EQ(machine->err.find("nothing, all") != std::string::npos, keep_going);
-        const auto lock = machine->session.lock();
-        EXPECT_EQ(machine->session.model().find_signal("y"), nullptr);
-        EXPECT_EQ(machine->session.model().find_signal("z"), nullptr);
-    }
-}
-
 TEST_F(StopTest, a_component_is_served_until_the_machine_has_ended_also_after_a_rejection) {
     serve();
     const auto c = client();
