@@ -37,6 +37,7 @@ const std::map<std::string, const char*> exceptions{
     {"modbus_node", "a network, which is started again"},
     {"cia402", "the drive, which a reload stops"},
     {"dds_publish", "a network, which is started again"},
+    {"dds_subscribe", "a network, which is started again"},
     {"lqr", "a thread of its own, which designs the gains again"},
     {"sampler", "a stream, which is published again"},
     {"scocan", "a network, which is started again"},
