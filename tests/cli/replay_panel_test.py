@@ -142,7 +142,9 @@ class ReplayPanel(Case):
             struct.unpack_from("<qqdq", samples["rows"], 32 * i)
             for i in range(samples["parts"][0]["rows"])
         ]
-        self.assertEqual(list(range(words[0][0], words[0][0] + len(words))), [w[0] for w in words])
+        # a cycle that an edit executes has no row
+        steps = {after[0] - before[0] for before, after in zip(words, words[1:])}
+        self.assertLessEqual(steps, {1, 2})
         self.assertGreater(len(words), 100)
         for _, time_ns, sine, online in words[1:-1]:
             self.assertIn(sine, recorded)

@@ -116,6 +116,8 @@ class Others(Case):
             if number in (signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU):
                 continue  # job control stops them, as it does any program
             self.survives(number, *words, wait=wait)
+        self.running.kill()  # one process reads a stream
+        self.running.communicate()
         for number in ENDING:
             program = self.program(*words)
             wait(program)
