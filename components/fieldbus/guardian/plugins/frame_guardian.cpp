@@ -93,7 +93,7 @@ struct FrameGuardian : hal::Component {
         if (local_) {
             setup_time_.expect(local_->closing_ns(), hal::can::closing_text);
             own_memory_.stop(StopReason::unload);
-            work_local(hal::can::unclocked);
+            work_local(local_ns_);
             report_outcome();
             local_.reset();
         }
@@ -160,6 +160,7 @@ private:
 
     /// What a guardian does in its turns. [realtime]
     void work_local(std::int64_t now) noexcept {
+        local_ns_ = now;
         const std::uint32_t count = own_memory_.stop_count.load(std::memory_order_acquire);
         if (count != stop_count_) {
             stop_count_ = count;
@@ -433,6 +434,7 @@ private:
     std::atomic<bool> is_interrupted_{false};  // written by the emergency function
 
     std::unique_ptr<StopTransmitter> local_;
+    std::int64_t local_ns_ = 0;  // when it has worked last
     GuardianMemory own_memory_;
     Status own_stops_;
     std::uint32_t stop_count_ = 0;
