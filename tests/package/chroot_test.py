@@ -79,15 +79,17 @@ class Chroot(unittest.TestCase):
         mounts = 'mount -t proc proc "$0/proc"; mount --rbind /dev "$0/dev"; mount --bind /etc/resolv.conf "$0/etc/resolv.conf" 2>/dev/null; exec chroot "$0" /usr/bin/env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin LC_ALL=C.UTF-8 DEBIAN_FRONTEND=noninteractive sh -c "$1"'
         return run("unshare", "-m", "sh", "-c", mounts, cls.root, script)
 
-    def good(self, script):
+    def good(self, script, tries=1):
         done = self.inside(script)
+        if done.returncode != 0 and tries > 1 and "[starved-thread]" in done.stdout:
+            return self.good(script, tries - 1)
         self.assertEqual(
             0, done.returncode, f"{script}\n{done.stdout[-3000:]}{done.stderr[-3000:]}"
         )
         return done.stdout
 
-    def of_user(self, script):
-        return self.good(f"su tester -c '{script}'")
+    def of_user(self, script, tries=1):
+        return self.good(f"su tester -c '{script}'", tries)
 
     def files(self):
         """What is in the chroot, except what apt and the accounts leave."""
@@ -237,8 +239,9 @@ class Chroot(unittest.TestCase):
 
     def check_machine(self):
         self.assertRegex(self.of_user("hal --version"), r"^hal \d+\.\d+\.\d+ ")
+        # again when other programs take the CPU for so long that the machine stops
         report = self.of_user(
-            "cd; hal run /usr/share/halcyon/halfiles/furuta/hang.hal --for 2s 2>&1"
+            "cd; hal run /usr/share/halcyon/halfiles/furuta/hang.hal --for 2s 2>&1", tries=3
         )
         self.assertRegex(report, r"servo-thread +1 ms +\d{4}")
         if self.good("getcap /usr/bin/hal"):

@@ -66,27 +66,6 @@ class Machine(Case):
     def test_g_code_moves_five_axes_over_ethercat(self):
         self.moves(lambda *words: self.launch(*words, ini="ethercat.ini"))
 
-    def test_g_code_moves_five_axes_over_a_wire_with_time_slots(self):
-        if SANITIZED:
-            self.skipTest("nine processes with a sanitizer are too slow for a wire")
-        if os.geteuid() != 0:
-            self.skipTest(
-                "time slots need real-time priority, which a user namespace withholds; run this as root"
-            )
-        machine = subprocess.run(
-            [MACHINE / "bring-up", self.write("empty.ngc", "M2\n")],
-            cwd=self.folder,
-            env={**self.environment, "HAL": str(HAL)},
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            timeout=150,
-        )
-        if machine.returncode == 77:
-            self.skipTest(machine.stdout.strip())
-        self.assertIn("homed; running empty.ngc\n", machine.stdout, machine.stderr)
-        self.assertIn("tdma.0: ", machine.stdout + machine.stderr)
-
     def moves(self, launch):
         short = self.folder / "short.ngc"
         short.write_text(
