@@ -5,6 +5,8 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <filesystem>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -142,7 +144,17 @@ int Shell::run_file(const std::string& path, Output& output) {
         }
         return report_unreadable(*this, output, path, problem, "unreadable-file", "");
     }
+    note_ini_beside(path);
     return run_text(path, std::move(text), output);
+}
+
+void Shell::note_ini_beside(const std::string& netlist) {
+    const std::string ini = std::filesystem::path(netlist).replace_extension(".ini").string();
+    std::error_code ignored;
+    if (std::filesystem::is_regular_file(resolve_path(ini, options.directory), ignored)) {
+        const auto lock = state_->session.lock();
+        state_->session.ini.set_candidate(ini);
+    }
 }
 
 int Shell::read_ini(const std::string& path, Output& output) {

@@ -170,6 +170,9 @@ public:
     struct State;
 
 private:
+    /// Keeps the name of the INI file that stands beside the netlist, for errors of keys without one.
+    void note_ini_beside(const std::string& netlist);
+
     std::unique_ptr<State> state_;
 };
 

@@ -47,6 +47,9 @@ public:
     /// Every "[SECTION]KEY" there is, for suggestions.
     std::vector<std::string> names() const;
     bool empty() const { return entries_.empty(); }
+    /// The file that stands beside the netlist, for the help when none was given; or "".
+    const std::string& candidate() const { return candidate_; }
+    void set_candidate(std::string path) { candidate_ = std::move(path); }
 
     struct Entry {
         std::string section, key, value;
@@ -60,6 +63,7 @@ public:
 
 private:
     std::vector<Entry> entries_;
+    std::string candidate_;
     /// "[SECTION]KEY" and "[]KEY" to the first entry
     std::unordered_map<std::string, std::size_t> first_;
 };

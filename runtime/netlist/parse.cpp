@@ -261,12 +261,19 @@ private:
                   " hal …");
     }
 
+    std::string ini_to_give() const {
+        const bool is_known =
+            environment_->ini != nullptr && !environment_->ini->candidate().empty();
+        return is_known ? environment_->ini->candidate() : "FILE.ini";
+    }
+
     void report_key(const Reference& reference, Span at) {
         const std::string name = reference_text(reference.section, reference.name);
         if (environment_->ini == nullptr || environment_->ini->empty()) {
+            const std::string file = ini_to_give();
             return error("unset-ini-key", at,
                          "'" + name + "' has no value: no INI file was given, or it has no keys",
-                         "", "specify it with --ini FILE.ini (halcmd: -i FILE.ini)");
+                         "", "specify it with --ini " + file + " (halcmd: -i " + file + ")");
         }
         const std::vector<std::string> names = environment_->ini->names();
         std::vector<std::string> section;
