@@ -193,6 +193,13 @@ class Release(Case):
         self.assertIn("URIs: https://example.org/halcyon/apt\n", sources)
         self.assertIn("\n -----BEGIN PGP PUBLIC KEY BLOCK-----\n .\n", sources)
 
+    def test_the_notes_list_what_is_in_the_folder(self):
+        for url in ("", "https://example.org/halcyon"):
+            self.assertEqual(0, self.release(url=url)[0])
+            rows = re.findall(r"(?m)^\| (`.*?) \| ", (self.output / "NOTES.md").read_text())
+            listed = {name.rstrip("/") for row in rows for name in re.findall(r"`(.*?)`", row)}
+            self.assertEqual({p.name for p in self.output.iterdir()} - {"NOTES.md"}, listed)
+
     def test_checksums_and_signatures_are_of_all_files(self):
         self.assertEqual(0, self.release()[0])
         sums = (self.output / "SHA256SUMS").read_text()

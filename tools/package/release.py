@@ -113,6 +113,9 @@ class Release:
             ("CHANGES", changes),
         ):
             template = template.replace(f"@{name}@", value)
+        if not self.url:
+            rows = template.splitlines(keepends=True)
+            template = "".join(row for row in rows if not row.startswith("| `halcyon.sources` |"))
         (self.output / "NOTES.md").write_text(template)
         for name in ("image.sh", "add-repository"):
             shutil.copyfile(HERE / "files" / name, self.output / name)
