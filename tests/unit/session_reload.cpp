@@ -120,6 +120,7 @@ TEST_F(Reload, that_a_hung_thread_may_still_use_leaves_nothing_to_the_next_edit)
     EXPECT_EQ(machine.get("c.step"), "1");
 
     Pin* const step = machine.session.model().find_pin("c.step");
+    EXPECT_TRUE(machine.session.threads().stop());  // the pin's thread reads it by plain moves
     machine.session.values().write({{step, hal_value{.real = 3.0}}});
     ASSERT_TRUE(eventually([&] { return machine.get("c.step") == "3"; }));
     EXPECT_FALSE(machine.edit("loadrt test-life names=w fail=start"));

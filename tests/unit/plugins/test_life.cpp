@@ -33,7 +33,8 @@ struct Life : hal::Component {
         ++watch.started;
         if (hal::test::Watch* const other = watch.hang_at_start.exchange(nullptr)) {
             other->hang = true;
-            while (!other->hanging) {
+            // a limit, because a thread that got no CPU runs no functions
+            for (int turn = 0; turn < 60'000 && !other->hanging; ++turn) {
                 std::this_thread::sleep_for(std::chrono::milliseconds(1));
             }
         }
