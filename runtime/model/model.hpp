@@ -207,7 +207,11 @@ struct ThreadOptions {
 
     /// The limit that takes effect: 10 periods or 100 ms, whichever is longer, when none was given.
     std::int64_t supervision_limit_ns() const {
+#if defined(__SANITIZE_THREAD__)
+        constexpr std::int64_t min = 1'000'000'000;  // its cycles take ten times as long
+#else
         constexpr std::int64_t min = 100'000'000;
+#endif
         if (supervise_ns >= 0) return supervise_ns;
         if (period_ns * 10 > min) return period_ns * 10;
         return min;
