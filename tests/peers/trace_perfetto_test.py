@@ -4,13 +4,13 @@
 """The Python package perfetto, with the public schema of Perfetto, parses what `hal trace` writes: no unknown field, and a replay of the timeline as
 a viewer does it: trace_perfetto_test.py PROGRAM."""
 import os
+import signal
 import subprocess
 import sys
 import tempfile
-import time
 from pathlib import Path
 
-from checks import check, checked
+from checks import check, checked, wait_for
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from peers import package  # noqa: E402
@@ -130,6 +130,13 @@ with tempfile.TemporaryDirectory() as folder:
             text=True,
         )
 
+    def value(pin):
+        return hal("shell", "getp", pin).stdout.strip()
+
+    def wait_for_cycles(count):
+        end = int(value("fast.threadbeat")) + count
+        wait_for(lambda: int(value("fast.threadbeat")) > end)
+
     Path(folder, "a.hal").write_text(MACHINE)
     Path(folder, "a.canopen").write_text(CANOPEN)
     machine = subprocess.Popen(
@@ -140,19 +147,19 @@ with tempfile.TemporaryDirectory() as folder:
         stderr=subprocess.DEVNULL,
     )
     try:
-        for _ in range(1000):
-            if hal("shell", "getp", "canopen.0.io.operational").stdout.strip() == "TRUE":
-                break
-            time.sleep(0.02)
+        wait_for(lambda: value("canopen.0.io.operational") == "TRUE")
         tracer = subprocess.Popen(
-            [sys.argv[1], "trace", "t.pftrace", "--for", "800ms"],
+            [sys.argv[1], "trace", "t.pftrace"],
             cwd=folder,
             env=environment,
             stdout=subprocess.PIPE,
             text=True,
         )
-        time.sleep(0.3)
+        wait_for(lambda: Path(folder, "t.pftrace").exists())
+        wait_for_cycles(100)
         hal("shell", "net", "late", "gate.out")
+        wait_for_cycles(400)
+        tracer.send_signal(signal.SIGINT)
         out = tracer.communicate()[0]
         check("the trace is written", tracer.returncode == 0, out)
     finally:
