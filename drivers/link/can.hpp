@@ -230,6 +230,10 @@ struct Description {
     bool has_bit_rate = true;
     /// Options::stamps gives received frames the timestamp of the kernel or of the bus
     bool has_stamps = false;
+    /// Options::own_frames returns a frame once it has been on the bus, so that another node has
+    /// acknowledged it; false: it has none, or returns it when the driver has accepted it
+    bool has_echo = false;
+    bool listen_only = false;  ///< send() rejects all frames, or the controller drops them
     bool has_windows = false;  ///< send() within a Window works
     /// Options::fd fails on a device without CAN FD: set it only when the user requests it
     bool fd_on_request = false;
@@ -278,6 +282,13 @@ public:
     /// Sends queued frames as far as the bus takes them; the rest stays for the next call. Call it
     /// once per cycle. [realtime] sender
     virtual void flush(std::int64_t now_ns) noexcept = 0;
+    /// Drops own frames that have not left for the controller: behind them, others would be late.
+    /// Without effect where the frames of this link are on the bus already, or in its schedule.
+    /// [realtime] sender
+    virtual void discard_queued() noexcept {}
+    /// Frames that leave from now on overtake those of other programs that wait in the queue of the
+    /// interface. Returns false where there is no such queue. [realtime] sender
+    virtual bool set_urgent(bool) noexcept { return false; }
     /// Receives the next frames in order of time. Returns how many; 0: none by now. [realtime]
     /// receiver
     virtual std::size_t receive(std::span<Frame> frames, std::int64_t now_ns) noexcept = 0;

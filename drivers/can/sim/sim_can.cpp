@@ -28,6 +28,7 @@ public:
         description_.data_rate = bus_->data_rate;
 
         description_.fd = bus_->fd;
+        description_.listen_only = options.listen_only;
         description_.has_windows = bus_->bit_rate != 0;
         bus_->add(node_);
     }
@@ -192,7 +193,8 @@ Description describe(const std::string& name) {
             .transport = "bus in memory",
             .simulated = true,
             .in_memory = true,
-            .has_stamps = true};
+            .has_stamps = true,
+            .has_echo = true};
 }
 
 Opened open(const std::string& name, const Options& options) {

@@ -86,6 +86,7 @@ public:
         description_.data_rate = counting_.data_rate;
 
         description_.fd = options.fd;
+        description_.listen_only = options.listen_only;
     }
     ~SerialLink() override {
         {

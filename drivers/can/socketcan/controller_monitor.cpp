@@ -16,6 +16,8 @@ namespace hal::can::socketcan {
 
 namespace {
 
+constexpr unsigned flag_echo = 1U << 18;  // IFF_ECHO, which net/if.h does not have
+
 struct Request {
     nlmsghdr header{};
     ifinfomsg info{};
@@ -95,6 +97,9 @@ void read_controller(const rtattr* info, Interface& found) {
             if (what == IFLA_CAN_DATA_BITTIMING) {
                 found.data_rate = value<can_bittiming>(b).bitrate;
             }
+            if (what == IFLA_CAN_CTRLMODE) {
+                found.listen_only = (value<can_ctrlmode>(b).flags & CAN_CTRLMODE_LISTENONLY) != 0;
+            }
             if (what == IFLA_CAN_STATE) {
                 found.has_state = true;
                 found.state = state_of(value<std::uint32_t>(b));
@@ -128,6 +133,7 @@ Interface ask(const std::string& name) {
     found.index = info->ifi_index;
     found.is_can = info->ifi_type == ARPHRD_CAN;
     found.up = (info->ifi_flags & IFF_UP) != 0;
+    found.has_echo = (info->ifi_flags & flag_echo) != 0;
     each_attribute(IFLA_RTA(info), IFLA_PAYLOAD(header), [&](int type, const rtattr* a) {
         if (type == IFLA_MTU) {
             found.mtu = value<std::uint32_t>(a);

@@ -19,6 +19,8 @@ struct Interface {
     int index = 0;  ///< 0: no such interface
     bool is_can = false;
     bool up = false;
+    bool has_echo = false;  ///< the driver returns a frame that was on the bus
+    bool listen_only = false;
     unsigned mtu = 0;
     std::string kind;  ///< "vcan", "can", "vxcan", …
     std::uint32_t bit_rate = 0;

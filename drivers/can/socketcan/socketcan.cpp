@@ -120,6 +120,10 @@ public:
         description_.data_rate = counting_.data_rate;
 
         description_.fd = options.fd;
+        // without IFF_ECHO the kernel returns a frame before the driver sends it (can_send()); what
+        // vcan accepts is on its bus
+        description_.has_echo = interface.has_echo || interface.kind == "vcan";
+        description_.listen_only = options.listen_only || interface.listen_only;
         for (std::size_t i = 0; i < batch; ++i) {
             parts_[i] = {&raw_[i], sizeof raw_[i]};
             in_[i].msg_hdr.msg_iov = &parts_[i];
@@ -146,9 +150,7 @@ public:
     void flush(std::int64_t) noexcept override {
         // Frames queued before the interface was lost must not be sent when it returns.
         if (state() == State::down) {
-            for (; outgoing_.front() != nullptr; outgoing_.drop()) {
-                Counting::add(counting_.dropped);
-            }
+            discard_queued();
         }
         for (bool again = true;;) {
             std::size_t count = 0;
@@ -182,6 +184,18 @@ public:
             outgoing_.drop();  // the kernel rejects this frame only
             Counting::add(counting_.dropped);
         }
+    }
+
+    void discard_queued() noexcept override {
+        for (; outgoing_.front() != nullptr; outgoing_.drop()) {
+            Counting::add(counting_.dropped);
+        }
+    }
+    /// A CAN interface has the discipline pfifo_fast, whose first of three bands has a queue of its
+    /// own (tc-pfifo_fast(8)). TC_PRIO_INTERACTIVE is the highest priority that needs no privilege.
+    bool set_urgent(bool is_urgent) noexcept override {
+        const int priority = is_urgent ? 6 : 0;
+        return set(socket_.get(), SOL_SOCKET, SO_PRIORITY, priority);
     }
 
     std::size_t receive(std::span<Frame> frames, std::int64_t now_ns) noexcept override {

@@ -164,6 +164,7 @@ public:
         description_.data_rate = counting_.data_rate;
 
         description_.fd = options.fd;
+        description_.listen_only = options.listen_only;
         socklen_t size = sizeof self_;
         getsockname(out_.get(), reinterpret_cast<sockaddr*>(&self_), &size);
     }
@@ -203,6 +204,12 @@ public:
                 counting_.count_sent(*outgoing_.at(static_cast<std::size_t>(i)));
             }
             outgoing_.drop(static_cast<std::size_t>(sent));
+        }
+    }
+
+    void discard_queued() noexcept override {
+        for (; outgoing_.front() != nullptr; outgoing_.drop()) {
+            Counting::add(counting_.dropped);
         }
     }
 
