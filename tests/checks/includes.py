@@ -163,7 +163,12 @@ ROWS = {
         "runtime/text",
         "drivers/link",
     ],
-    "components/modbus/master": ["components/modbus/config", "components/bus/events", "runtime/sdk"],
+    "components/modbus/master": [
+        "components/modbus/config",
+        "components/bus/events",
+        "components/bus/guardian",
+        "runtime/sdk",
+    ],
     "components/modbus/device": ["components/modbus/config"],
     "components/modbus/guardian": [
         "components/modbus/master",

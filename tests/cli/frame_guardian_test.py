@@ -11,7 +11,8 @@ import time
 import unittest
 from pathlib import Path
 
-from harness import Case, Terminal, wait_until
+from guarded_machine import GuardedMachine
+from harness import Case, wait_until
 from own_network import own_network
 
 TYPE = 0x88B5  # IEEE 802, local experimental ethertype 1
@@ -23,7 +24,18 @@ loadrt frame_guardian names=guard link=eth:lo send={FRAME},{LAST}
 addf guard.update servo
 start
 """
-SENT = "the stop frames were sent 3 times"
+SENT = "the stop frames were handed to the driver 3 times"
+# Stops a process in a way that no SIGCONT ends: ptrace(2), PTRACE_SEIZE and PTRACE_INTERRUPT
+TRACER = """import ctypes, os, sys, time
+process = int(sys.argv[1])
+ptrace = ctypes.CDLL(None).ptrace
+ptrace.argtypes = [ctypes.c_long, ctypes.c_long, ctypes.c_void_p, ctypes.c_void_p]
+for task in os.listdir(f"/proc/{process}/task"):
+    if ptrace(0x4206, int(task), None, None) == 0 and ptrace(0x4207, int(task), None, None) == 0:
+        os.waitpid(int(task), 0x40000000)
+print("traced", flush=True)
+time.sleep(60)
+"""
 
 
 class Listener:
@@ -54,18 +66,19 @@ class Listener:
         self.socket.close()
 
 
-class FrameGuardian(Case):
+class FrameGuardian(GuardedMachine, Case):
+    program = "hal-frame-guardian"
+    netlist = "guard.hal"
+
     def setUp(self):
         super().setUp()
         self.write("guard.hal", NETLIST)
         self.bus = Listener()
         self.addCleanup(self.bus.close)
 
-    def guarded_machine(self, **how):
-        machine = self.start("run", "guard.hal", **how)
+    def guarded(self):
         self.comes("guard.guarded", "TRUE")
         self.assertEqual([], self.bus.frames)
-        return machine
 
     def stops(self, since, rounds=3):
         """Waits for all frames, in their order."""
@@ -74,53 +87,25 @@ class FrameGuardian(Case):
         self.assertEqual([b"ST", b"OP"], payloads[:2])
         self.assertEqual([b"ST", b"OP"] * rounds, payloads[: 2 * rounds])
 
-    def guardian_of(self, machine):
-        """The process of the guardian."""
-        for children in Path(f"/proc/{machine.pid}/task").glob("*/children"):
-            for child in children.read_text().split():
-                if "hal-frame-guard" in Path(f"/proc/{child}/comm").read_text():
-                    return int(child)
-        raise AssertionError("there is no guardian")
-
-    def killed(self, number, group=False):
-        machine = self.guarded_machine(start_new_session=True)
-        since = time.monotonic()
-        if group:
-            os.killpg(machine.pid, number)
-        else:
-            machine.send_signal(number)
-        self.stops(since)
-        return self.end(machine, signal.SIGKILL)
-
     def set_link(self, state):
         subprocess.run(["ip", "link", "set", "lo", state], check=True)
-
-    def next_start(self):
-        machine = self.start("run", "guard.hal")
-        return self.end(machine)[1]
 
     def test_a_killed_process_and_its_report(self):
         errors = self.killed(signal.SIGKILL)[1]
         self.assertRegex(
             errors,
             r"guard: guardian: \d{4}-\d\d-\d\d \d\d:\d\d:\d\d, the process has ended; "
-            r"the stop frames were sent 3 times; \d+\.\d ms\n",
+            rf"{SENT}; \d+\.\d ms\n",
         )
         self.assertRegex(
             self.next_start(),
             "guard: the guardian of the previous run: .*, the process has ended; "
-            r"the stop frames were sent 3 times; \d+\.\d ms\n",
+            rf"{SENT}; \d+\.\d ms\n",
         )
         self.assertNotIn("previous run", self.next_start())
 
-    def test_a_killed_process_group(self):
-        self.killed(signal.SIGKILL, group=True)
-
-    def test_a_segmentation_fault(self):
-        self.killed(signal.SIGSEGV)
-
     def test_sigterm(self):
-        machine = self.guarded_machine()
+        machine = self.run_guarded()
         since = time.monotonic()
         errors = self.end(machine)[1]
         self.stops(since)
@@ -130,26 +115,13 @@ class FrameGuardian(Case):
         self.assertNotIn("previous run", self.next_start())
 
     def test_a_suspended_process(self):
-        machine = self.guarded_machine()
-        since = time.monotonic()
-        machine.send_signal(signal.SIGSTOP)
-        self.stops(since)
+        machine = self.suspended()
         machine.send_signal(signal.SIGKILL)
         errors = self.end(machine, signal.SIGKILL)[1]
         self.assertIn(f"the process has ended after its cycles had stopped; {SENT}", errors)
 
-    def test_a_closed_terminal(self):
-        terminal = Terminal(self, "run", "guard.hal")
-        self.comes("guard.guarded", "TRUE")
-        since = time.monotonic()
-        os.close(terminal.descriptor)
-        terminal.descriptor = os.open("/dev/null", os.O_RDWR)
-        self.stops(since)
-        os.waitpid(terminal.process, 0)
-        terminal.status = 0
-
     def test_e_stop_stop_and_unload(self):
-        machine = self.guarded_machine()
+        machine = self.run_guarded()
         for words in (("setp", "guard.estop", "TRUE"), ("stop",)):
             self.bus.frames.clear()
             since = time.monotonic()
@@ -175,38 +147,101 @@ class FrameGuardian(Case):
         ):
             self.assertIn(f"guard: sends the stop frames: {reason}\n", errors)
 
-    def test_the_guardian_is_killed(self):
-        machine = self.guarded_machine()
-        os.kill(self.guardian_of(machine), signal.SIGKILL)
-        self.comes("guard.guarded", "FALSE")
-        self.comes("guard.fault", "TRUE")
-        self.assertIn(
-            "guard: the guardian has ended: nothing sends the stop frames any more",
-            self.say("show", "fault"),
+    def test_a_killed_guardian_is_replaced(self):
+        machine = self.run_guarded()
+        first = self.kill_guardian(machine)
+        second = wait_until(
+            lambda: [one for one in self.guardians_of(machine) if one != first], "another guardian"
         )
-        errors = self.end(machine)[1]
+        self.comes("guard.guarded", "TRUE")
+        self.assertEqual(1, len(second))
+        self.assertEqual([], self.bus.frames)
+        since = time.monotonic()
+        machine.send_signal(signal.SIGKILL)
+        self.stops(since)
+        errors = self.end(machine, signal.SIGKILL)[1]
         self.assertIn(
-            "guard: the guardian has ended: nothing sends the stop frames any more; "
-            "type: unloadrt, loadrt\n",
+            "guard: the guardian has ended: nothing sends the stop frames until another one is "
+            "started\n"
+            "guard: another guardian has taken over; it sends what the first one has not sent\n",
             errors,
         )
+        self.assertIn(f"the process has ended; {SENT}", errors)
+        self.assertIn(f"the process has ended; {SENT}", self.next_start())
 
-    def test_the_guardian_is_suspended(self):
-        machine = self.guarded_machine()
-        os.kill(self.guardian_of(machine), signal.SIGSTOP)
+    def test_a_stop_that_is_requested_without_a_guardian_is_sent_by_the_next_one(self):
+        machine = self.run_guarded()
+        self.say("setp", "guard.estop", "TRUE")
+        self.stops(0)
+        self.comes("guard.stopped", "TRUE")
+        self.bus.frames.clear()
+        since = time.monotonic()
+        self.kill_guardian(machine)
+        self.stops(since)  # the reason lasts
+        self.comes("guard.stopped", "TRUE")
+        self.assertEqual("2", self.value("guard.stops"))
+        self.end(machine)
+
+    def test_a_guardian_that_is_killed_at_the_end_is_replaced(self):
+        machine = self.run_guarded()
+        guardian = self.suspend_guardian(machine)
+        self.say("stop")
+        os.kill(guardian, signal.SIGKILL)
+        since = time.monotonic()
+        errors = self.end(machine)[1]
+        self.stops(since)
+        self.assertRegex(errors, rf"guard: {SENT} after \d+\.\d ms\n")
+
+    def test_a_suspended_guardian_is_continued(self):
+        machine = self.run_guarded()
+        guardian = self.suspend_guardian(machine)
         wait_until(
             lambda: "guard: the guardian stalls: no stop frame is sent"
             in self.say("show", "fault"),
             "the stall is seen",
         )
         wait_until(lambda: "(lasts)" not in self.say("show", "fault"), "it is continued")
-        self.assertEqual("TRUE", self.value("guard.guarded"))
+        self.comes("guard.guarded", "TRUE")
+        self.assertEqual(guardian, self.guardian_of(machine))
         errors = self.end(machine)[1]
         stalls = (
             "guard: the guardian stalls: no stop frame is sent; stop the drives by other means\n"
         )
         self.assertIn(stalls, errors)
         self.assertIn("guard: the guardian runs again\n", errors)
+
+    def test_a_guardian_that_cannot_be_continued_is_replaced(self):
+        machine = self.run_guarded()
+        first = self.guardian_of(machine)
+        tracer = subprocess.Popen([sys.executable, "-c", TRACER, str(first)], stdout=subprocess.PIPE)
+        self.addCleanup(tracer.kill)
+        self.assertEqual(b"traced\n", tracer.stdout.readline())
+        wait_until(
+            lambda: self.guardians_of(machine) not in ([], [first]), "another guardian is started"
+        )
+        self.comes("guard.guarded", "TRUE")
+        tracer.kill()
+        tracer.wait()
+        tracer.stdout.close()
+        since = time.monotonic()
+        machine.send_signal(signal.SIGKILL)
+        self.stops(since)
+        self.assertIn(
+            "guard: the guardian has stalled for 1.5 s and is killed; another one is started\n",
+            self.end(machine, signal.SIGKILL)[1],
+        )
+
+    def test_a_short_e_stop_is_counted(self):
+        machine = self.run_guarded()
+        for number in range(1, 4):
+            self.bus.frames.clear()
+            since = time.monotonic()
+            self.say("setp", "guard.estop", "TRUE")
+            self.stops(since)
+            self.say("setp", "guard.estop", "FALSE")  # shorter than anyone looks, it is counted
+            wait_until(lambda: self.value("guard.stops") == str(number), "the stop is counted")
+            self.comes("guard.stopped", "FALSE")
+        self.end(machine)
 
     def test_a_journal_is_executed_again(self):
         machine = self.start("run", "guard.hal", "--journal", "run.mcap", "--values", "*")
@@ -221,16 +256,53 @@ class FrameGuardian(Case):
         self.assertEqual([], self.bus.frames)
 
     def test_a_link_without_carrier_at_the_end(self):
-        machine = self.guarded_machine()
+        machine = self.run_guarded()
+        self.set_link("down")
+        self.addCleanup(self.set_link, "up")
+        self.comes("guard.guarded", "FALSE")
+        self.comes("guard.fault", "TRUE")
+        self.assertIn("eth:lo is down or bus off", self.say("show", "fault"))
+        self.say("setp", "guard.estop", "TRUE")
+        wait_until(
+            lambda: "the stop frames are not sent" in self.say("show", "fault"), "it is reported"
+        )
+        errors = self.end(machine)[1]
+        self.assertIn("guard: eth:lo is down or bus off: a stop frame could not be sent now\n", errors)
+        self.assertIn(
+            "guard: the stop frames are not sent: eth:lo does not accept or acknowledge them: "
+            f"{FRAME} and 1 more: the interface is down; they are tried again until it does\n",
+            errors,
+        )
+        self.assertIn(
+            "guard: not all stop frames were sent on eth:lo in time (handed to the driver 0 times: "
+            f"{FRAME} and 1 more: the interface is down); stop the drives by other means\n",
+            errors,
+        )
+
+    def test_a_link_that_is_down_is_tried_until_it_is_up(self):
+        machine = self.run_guarded()
         self.set_link("down")
         self.addCleanup(self.set_link, "up")
         self.say("setp", "guard.estop", "TRUE")
-        self.comes("guard.fault", "TRUE")
-        errors = self.end(machine)[1]
+        wait_until(
+            lambda: "the stop frames are not sent" in self.say("show", "fault"), "it is reported"
+        )
+        self.say("setp", "guard.estop", "FALSE")
+        self.assertEqual("TRUE", self.value("guard.fault"), "the stop was not sent")
+        since = time.monotonic()
+        self.set_link("up")
+        self.stops(since)
+        self.comes("guard.fault", "FALSE")
+        self.end(machine)
+
+    def test_a_frame_that_is_longer_than_the_interface_sends_is_rejected(self):
+        subprocess.run(["ip", "link", "set", "lo", "mtu", "100"], check=True)
+        self.addCleanup(subprocess.run, ["ip", "link", "set", "lo", "mtu", "65536"], check=True)
+        self.write("long.hal", NETLIST.replace("5354", "00" * 101))
         self.assertIn(
-            "guard: eth:lo has not taken the stop frames within 2 s (0 times sent); "
-            "stop the drives by other means\n",
-            errors,
+            "a stop frame has 115 bytes, and eth:lo sends at most 114; write a shorter one, or raise "
+            "the MTU of the interface",
+            self.bad("run", "long.hal"),
         )
 
     def test_an_interface_that_does_not_exist(self):

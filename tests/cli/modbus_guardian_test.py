@@ -8,7 +8,8 @@ import signal
 import time
 import unittest
 
-from harness import Case, Terminal, suspend, wait_until
+from guarded_machine import GuardedMachine
+from harness import Case, wait_until
 from modbus_drive import BROADCAST_STOP, RUN, STOP, Drive
 
 CONFIGURATION = """[bus]
@@ -27,7 +28,10 @@ start
 """
 
 
-class Guardian(Case):
+class Guardian(GuardedMachine, Case):
+    program = "hal-guardian"
+    netlist = "spindle.hal"
+
     def setUp(self):
         super().setUp()
         self.write("spindle.modbus", CONFIGURATION)
@@ -35,12 +39,8 @@ class Guardian(Case):
         self.drive = Drive(str(self.folder / "line"))
         self.addCleanup(self.drive.close)
 
-    def run_spindle(self, **how):
-        machine = self.start("run", "spindle.hal", **how)
-        self.turn()
-        return machine
-
-    def turn(self):
+    def guarded(self):
+        """Waits until it is, and turns the spindle."""
         self.comes("modbus.0.spindle.online", "TRUE")
         self.assertEqual("TRUE", self.value("modbus.0.guarded"))
         self.say("setp", "modbus.0.spindle.run", "TRUE")
@@ -54,35 +54,12 @@ class Guardian(Case):
         self.assertEqual(STOP, commands[-1][1])
         self.assertTrue(any(when >= since and frame == STOP for when, frame in commands))
 
-    def report_of_next_start(self):
-        machine = self.start("run", "spindle.hal")
-        return self.end(machine)[1]
-
-    def killed(self, number, group=False):
-        machine = self.run_spindle(start_new_session=True)
-        since = time.monotonic()
-        if group:
-            os.killpg(machine.pid, number)
-        else:
-            machine.send_signal(number)
-        self.stops(since)
-        self.end(machine, signal.SIGKILL)
-
     def test_a_killed_process(self):
         self.killed(signal.SIGKILL)
         self.assertIn(
-            "slave 1 (spindle) acknowledged its stop telegrams", self.report_of_next_start()
+            "slave 1 (spindle) acknowledged its stop telegrams", self.next_start()
         )
-        self.assertNotIn("previous run", self.report_of_next_start())
-
-    def test_a_killed_process_group(self):
-        self.killed(signal.SIGKILL, group=True)
-
-    def test_a_segmentation_fault(self):
-        self.killed(signal.SIGSEGV)
-
-    def test_an_abort(self):
-        self.killed(signal.SIGABRT)
+        self.assertNotIn("previous run", self.next_start())
 
     def test_sigterm(self):
         self.killed(signal.SIGTERM)
@@ -91,27 +68,14 @@ class Guardian(Case):
         self.killed(signal.SIGINT, group=True)
 
     def test_a_suspended_process(self):
-        machine = self.run_spindle()
-        since = time.monotonic()
-        machine.send_signal(signal.SIGSTOP)
-        self.stops(since)
+        machine = self.suspended()
         machine.send_signal(signal.SIGCONT)
         wait_until(lambda: self.value("modbus.0.spindle.stopped") == "FALSE", "writes are allowed")
         self.assertEqual(1, self.drive.registers[0x2000])  # needs another edge of run
         self.end(machine)
 
-    def test_a_closed_terminal(self):
-        terminal = Terminal(self, "run", "spindle.hal")
-        self.turn()
-        since = time.monotonic()
-        os.close(terminal.descriptor)
-        terminal.descriptor = os.open("/dev/null", os.O_RDWR)
-        self.stops(since)
-        os.waitpid(terminal.process, 0)
-        terminal.status = 0
-
     def test_unload_and_e_stop_and_stop(self):
-        machine = self.run_spindle()
+        machine = self.run_guarded()
         for words in (("setp", "modbus.0.estop", "TRUE"), ("stop",), ("unload", "modbus")):
             since = time.monotonic()
             if words[0] == "unload":
@@ -135,7 +99,7 @@ class Guardian(Case):
         self.end(machine)
 
     def test_an_ordinary_end(self):
-        machine = self.run_spindle()
+        machine = self.run_guarded()
         since = time.monotonic()
         self.say("exit")
         self.end(machine)
@@ -144,7 +108,7 @@ class Guardian(Case):
     def test_a_broadcast_stop_is_sent_before_and_behind_the_addressed_one(self):
         broadcast = "[bus]\nbroadcast-stop = holding 0x2000 1\nturnaround = 40ms\n"
         self.write("spindle.modbus", CONFIGURATION.replace("[bus]\n", broadcast))
-        machine = self.run_spindle()
+        machine = self.run_guarded()
         begin = len(self.drive.writes)
         machine.send_signal(signal.SIGKILL)
         wait_until(
@@ -155,15 +119,14 @@ class Guardian(Case):
         self.assertEqual([BROADCAST_STOP, STOP, BROADCAST_STOP], [f for _, f in writes[-3:]])
         self.assertIn(
             "; the broadcast stop was sent; slave 1 (spindle) acknowledged its stop telegrams",
-            self.report_of_next_start(),
+            self.next_start(),
         )
 
     def test_a_broadcast_stop_that_cannot_be_sent_is_not_reported_as_sent(self):
         broadcast = "[bus]\nbroadcast-stop = holding 0x2000 1\nturnaround = 40ms\n"
         self.write("spindle.modbus", CONFIGURATION.replace("[bus]\n", broadcast))
-        machine = self.run_spindle()
-        guardian = self.children(machine.pid)[0]
-        suspend(guardian)
+        machine = self.run_guarded()
+        guardian = self.suspend_guardian(machine)
         self.drive.close()
         machine.kill()
         machine.wait()
@@ -211,19 +174,17 @@ class Guardian(Case):
                 self.end(machine)
 
     def test_a_drive_that_does_not_answer_is_reported(self):
-        machine = self.run_spindle()
+        machine = self.run_guarded()
         self.drive.answers = False
         machine.send_signal(signal.SIGKILL)
         wait_until(lambda: self.drive.registers[0x2000] == 1, "the stop telegram was sent")
         self.end(machine, signal.SIGKILL)
         self.drive.answers = True
-        self.assertIn("did not acknowledge", self.report_of_next_start())
+        self.assertIn("did not acknowledge", self.next_start())
 
     def test_a_killed_guardian_is_a_fault(self):
-        machine = self.run_spindle()
-        children = self.children(machine.pid)
-        self.assertEqual(1, len(children))
-        os.kill(children[0], signal.SIGKILL)
+        machine = self.run_guarded()
+        self.kill_guardian(machine)
         self.comes("modbus.0.fault", "TRUE")
         self.assertEqual("FALSE", self.value("modbus.0.guarded"))
         self.assertEqual("FALSE", self.value("modbus.0.spindle.online"))
@@ -234,21 +195,20 @@ class Guardian(Case):
         self.assertIn("acknowledged its stop telegrams", out)
 
     def test_a_killed_guardian_of_a_machine_that_ends_then(self):
-        machine = self.run_spindle()
+        machine = self.run_guarded()
         self.drive.answers = False
-        os.kill(self.children(machine.pid)[0], signal.SIGKILL)
+        self.kill_guardian(machine)
         wait_until(lambda: self.drive.registers[0x2000] == 1, "the stop telegram was sent")
         self.comes("modbus.0.fault", "TRUE")
-        wait_until(lambda: not self.children(machine.pid), "the other guardian has given up")
+        wait_until(lambda: not self.guardians_of(machine), "the other guardian has given up")
         self.drive.answers = True
         self.drive.registers[0x2000] = RUN
         self.assertIn("acknowledged its stop telegrams", self.end(machine)[1])
         self.assertEqual(STOP, self.drive.writes[-1][1])
 
     def test_a_suspended_guardian_is_a_fault_and_continued(self):
-        machine = self.run_spindle()
-        guardian = self.children(machine.pid)[0]
-        os.kill(guardian, signal.SIGSTOP)
+        machine = self.run_guarded()
+        guardian = self.suspend_guardian(machine)
         self.drive.registers[0x2103] = 0
         self.comes("modbus.0.spindle.at-speed", "FALSE")
         wait_until(lambda: self.value("modbus.0.guarded") == "TRUE", "it is continued")
@@ -260,32 +220,17 @@ class Guardian(Case):
         self.assertIn("the guardian runs again", out)
 
     def test_a_line_in_use_is_not_opened(self):
-        machine = self.run_spindle()
+        machine = self.run_guarded()
         self.assertIn(
             "another program uses 'line'",
             self.bad("modbus", "read", "serial:line?baud=115200", "1", "holding", "0x2103"),
         )
         self.assertIn(
-            "another program uses 'line'", self.bad("run", "--name", "two", "spindle.hal")
+            "another program uses 'serial:line'", self.bad("run", "--name", "two", "spindle.hal")
         )
         self.assertEqual(RUN, self.drive.registers[0x2000])
         self.assertEqual("0", self.value("modbus.0.spindle.timeouts"))
         self.end(machine)
-
-    @staticmethod
-    def children(pid):
-        found = []
-        for entry in os.listdir("/proc"):
-            if not entry.isdigit():
-                continue
-            try:
-                with open(f"/proc/{entry}/stat") as stat:
-                    name, rest = stat.read().rsplit(")", 1)
-            except OSError:
-                continue
-            if int(rest.split()[1]) == pid and "hal-guardian" in name:
-                found.append(int(entry))
-        return found
 
     def test_a_line_that_cannot_be_opened_is_reported(self):
         os.unlink(self.folder / "line")

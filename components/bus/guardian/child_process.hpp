@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "bus/guardian/ambient_capabilities.hpp"
+#include "bus/guardian/start_state.hpp"
 #include "link/system.hpp"
 
 extern char** environ;
@@ -26,6 +27,7 @@ namespace hal::bus {
 /// Descriptors of a guardian.
 inline constexpr int guardian_memory_fd = 3;
 inline constexpr int guardian_text_fd = 4;
+inline constexpr int guardian_lock_fd = 5;  ///< of ReportLock; never read
 
 class ChildProcess {
 public:
@@ -57,34 +59,20 @@ public:
     }
     void* memory() const noexcept { return memory_; }
 
-    /// Starts the program `arguments[0]` with these arguments and the number of this process.
+    /// Starts the program `arguments[0]` with these arguments and the number of this process, and
+    /// waits until `start`, in the memory, shows that it watches. `lock` is a descriptor that it
+    /// inherits, or -1. Once this process has ended, it may be started again: with the same memory.
     /// Returns the problem, or "". [setup]
-    std::string spawn(std::vector<std::string> arguments) {
-        Attributes attributes;
-        // dup2 onto the same number would keep O_CLOEXEC, so both go through numbers above
-        const link::Descriptor memory(fcntl(memory_fd_.get(), F_DUPFD_CLOEXEC, 16));
-        const link::Descriptor text(fcntl(text_fd_.get(), F_DUPFD_CLOEXEC, 16));
-        posix_spawn_file_actions_adddup2(&attributes.actions, memory.get(), guardian_memory_fd);
-        posix_spawn_file_actions_adddup2(&attributes.actions, text.get(), guardian_text_fd);
-        posix_spawn_file_actions_addopen(&attributes.actions, 0, "/dev/null", O_RDONLY, 0);
-        posix_spawn_file_actions_addopen(&attributes.actions, 1, "/dev/null", O_WRONLY, 0);
-        arguments.push_back(std::to_string(getpid()));
-        std::vector<char*> argv;
-        for (std::string& argument : arguments) {
-            argv.push_back(argument.data());
+    std::string start(std::vector<std::string> arguments, StartState& start, int lock) {
+        start.begin();
+        std::string problem = spawn(std::move(arguments), lock);
+        if (problem.empty()) {
+            problem = await(start);
         }
-        argv.push_back(nullptr);
-        const AmbientCapabilities capabilities;
-        const int error = posix_spawn(&pid_, arguments[0].c_str(), &attributes.actions,
-                                      &attributes.attributes, argv.data(), environ);
-        memory_fd_ = link::Descriptor();
-        text_fd_ = link::Descriptor();
-        if (error != 0) {
-            pid_ = -1;
-            return "cannot start the guardian '" + arguments[0] + "': " + link::reason(error);
+        if (!problem.empty()) {
+            kill();
         }
-        process_ = link::Descriptor(static_cast<int>(syscall(SYS_pidfd_open, pid_, 0)));
-        return {};
+        return problem;
     }
 
     bool is_running() const noexcept { return pid_ >= 0; }
@@ -97,7 +85,7 @@ public:
         pid_ = -1;
         return true;
     }
-    /// Continues a guardian that was suspended by a signal. [any]
+    /// Continues a guardian that was suspended by a signal. Belongs to the thread that starts it.
     void resume() const noexcept {
         if (process_) {
             syscall(SYS_pidfd_send_signal, process_.get(), SIGCONT, nullptr, 0);
@@ -112,6 +100,8 @@ public:
     }
 
 private:
+    static constexpr std::int64_t start_limit_ns = 3'000'000'000;
+
     /// A session of its own, so that Ctrl-C and a closed terminal miss it, and no signal mask of
     /// the runtime.
     struct Attributes {
@@ -135,7 +125,57 @@ private:
         posix_spawn_file_actions_t actions;
     };
 
-    link::Descriptor memory_fd_, text_fd_;  // until the process runs
+    std::string spawn(std::vector<std::string> arguments, int lock) {
+        Attributes attributes;
+        // dup2 onto the same number would keep O_CLOEXEC, so all go through numbers above
+        const link::Descriptor memory(fcntl(memory_fd_.get(), F_DUPFD_CLOEXEC, 16));
+        const link::Descriptor text(fcntl(text_fd_.get(), F_DUPFD_CLOEXEC, 16));
+        const link::Descriptor locked(lock < 0 ? ::open("/dev/null", O_RDONLY | O_CLOEXEC)
+                                               : fcntl(lock, F_DUPFD_CLOEXEC, 16));
+        if (!memory || !text || !locked) {
+            return "no descriptors for the guardian: " + link::reason();
+        }
+        posix_spawn_file_actions_adddup2(&attributes.actions, memory.get(), guardian_memory_fd);
+        posix_spawn_file_actions_adddup2(&attributes.actions, text.get(), guardian_text_fd);
+        posix_spawn_file_actions_adddup2(&attributes.actions, locked.get(), guardian_lock_fd);
+        posix_spawn_file_actions_addopen(&attributes.actions, 0, "/dev/null", O_RDONLY, 0);
+        posix_spawn_file_actions_addopen(&attributes.actions, 1, "/dev/null", O_WRONLY, 0);
+        arguments.push_back(std::to_string(getpid()));
+        std::vector<char*> argv;
+        for (std::string& argument : arguments) {
+            argv.push_back(argument.data());
+        }
+        argv.push_back(nullptr);
+        int error = 0;
+        {
+            const AmbientCapabilities capabilities;
+            error = posix_spawn(&pid_, arguments[0].c_str(), &attributes.actions,
+                                &attributes.attributes, argv.data(), environ);
+        }
+        if (error != 0) {
+            pid_ = -1;
+            return "cannot start the guardian '" + arguments[0] + "': " + link::reason(error);
+        }
+        process_ = link::Descriptor(static_cast<int>(syscall(SYS_pidfd_open, pid_, 0)));
+        if (!process_) return "cannot watch the guardian: " + link::reason();
+        return {};
+    }
+
+    /// Waits until the guardian watches. Returns the problem, or "".
+    std::string await(const StartState& start) {
+        const std::int64_t limit = link::monotonic_ns() + start_limit_ns;
+        while (start.phase() == StartState::Phase::starting) {
+            const bool has_ended = has_ended_within(2'000'000);
+            if (!has_ended && link::monotonic_ns() < limit) continue;
+            if (start.phase() != StartState::Phase::starting) break;
+            return has_ended ? "the guardian has ended during its start"
+                             : "the guardian did not start within 3 s";
+        }
+        if (start.phase() == StartState::Phase::rejected) return start.problem();
+        return {};
+    }
+
+    link::Descriptor memory_fd_, text_fd_;
     void* memory_ = nullptr;
     std::size_t size_ = 0;
     pid_t pid_ = -1;

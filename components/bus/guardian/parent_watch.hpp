@@ -21,6 +21,7 @@ public:
         hangs,  ///< no cycle for longer than the limit, or the computer was suspended
     };
 
+    /// `parent`: empty when the process has ended already, which the first look() finds.
     explicit ParentWatch(link::Descriptor parent)
         : parent_(std::move(parent)), suspended_ns_(suspended_ns()) {}
 
@@ -35,7 +36,7 @@ public:
         const bool is_missing = heartbeat_.is_missing(cycles, limit_ns, now_ns);
         hangs_ = has_outputs && (is_missing || resumed);
         if (is_dead_) return Change::none;
-        is_dead_ = link::readable_within(parent_.get(), 0);
+        is_dead_ = !parent_ || link::readable_within(parent_.get(), 0);
         if (is_dead_) return Change::died;
         return hangs_ && !hung_before ? Change::hangs : Change::none;
     }

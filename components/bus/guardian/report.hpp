@@ -3,6 +3,7 @@
 #pragma once
 
 #include <fcntl.h>
+#include <poll.h>
 #include <stdlib.h>
 #include <time.h>
 #include <unistd.h>
@@ -61,20 +62,36 @@ inline std::string take_report(const std::string& file) {
     return text;
 }
 
-/// Writes the file; an empty name: nothing. Returns false when it is incomplete or missing.
+/// Writes the entry of a file in its folder to the disk.
+inline bool keep_name(const char* file) {
+    const std::filesystem::path folder = std::filesystem::path(file).parent_path();
+    const link::Descriptor fd(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+    return fd && ::fsync(fd.get()) == 0;
+}
+
+/// Writes the file to the disk; an empty name: nothing. Returns false when it is incomplete or
+/// missing.
 inline bool keep_report(const char* file, const std::string& text) {
     if (file[0] == '\0') return true;
     const link::Descriptor fd(
         ::open(file, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0600));
-    return fd && write_whole(fd.get(), text + "\n");
+    if (!fd || !write_whole(fd.get(), text + "\n")) return false;
+    return ::fsync(fd.get()) == 0 && keep_name(file);
 }
 
-/// Reports on standard error and in the file; what one of them does not accept whole goes to the
-/// system's log as well. `name`: of the instance.
+/// Prints a line on standard error, whose reader has a second to accept it.
+inline bool print_report(const std::string& line) {
+    pollfd output{STDERR_FILENO, POLLOUT, 0};
+    if (::poll(&output, 1, 1000) <= 0) return false;
+    return write_whole(STDERR_FILENO, line);
+}
+
+/// Reports in the file, and then on standard error, whose reader may make it wait; what one of them
+/// does not accept whole goes to the system's log as well. `name`: of the instance.
 inline void report_end(const char* name, const char* file, const std::string& text) {
     const std::string line = std::string(name) + ": guardian: " + text + "\n";
-    const bool printed = write_whole(STDERR_FILENO, line);
     const bool kept = keep_report(file, text);
+    const bool printed = print_report(line);
     if (!printed || !kept) {
         write_system_log("hal-guardian", line);
     }

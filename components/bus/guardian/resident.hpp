@@ -7,10 +7,12 @@
 #include <signal.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <sys/syscall.h>
 #include <unistd.h>
 
 #include <array>
+#include <cstddef>
 #include <cstdlib>
 #include <string>
 
@@ -42,14 +44,26 @@ inline void be_resident() {
     }
 }
 
-/// Closes what was inherited but the two descriptors of a guardian, and opens the process that
-/// started it; an empty descriptor: it has ended already. [setup]
+/// Closes what was inherited but the descriptors of a guardian, and opens the process that started
+/// it; an empty descriptor: it has ended already. [setup]
 inline link::Descriptor open_parent(const char* pid_text) {
-    syscall(SYS_close_range, guardian_text_fd + 1, ~0U, 0);
+    syscall(SYS_close_range, guardian_lock_fd + 1, ~0U, 0);
     const auto pid = static_cast<pid_t>(std::atoi(pid_text));
     link::Descriptor parent(static_cast<int>(syscall(SYS_pidfd_open, pid, 0)));
     if (getppid() != pid) return link::Descriptor();
     return parent;
+}
+
+/// Maps the memory that the component shares. Returns nullptr when it has another size. [setup]
+inline void* map_guardian_memory(std::size_t size) {
+    struct stat memory{};
+    if (fstat(guardian_memory_fd, &memory) != 0 ||
+        static_cast<std::size_t>(memory.st_size) != size) {
+        return nullptr;
+    }
+    void* const mapped = mmap(nullptr, size, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_POPULATE,
+                              guardian_memory_fd, 0);
+    return mapped == MAP_FAILED ? nullptr : mapped;
 }
 
 /// Returns what the component has written for the guardian. [setup]

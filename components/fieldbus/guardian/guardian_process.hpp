@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The guardian as its component sees it: starts the process and ends it.
+// The guardian as its component sees it: starts the process, replaces and ends it.
 #pragma once
 
 #include <cstdint>
@@ -19,36 +19,43 @@ struct GuardianArguments {
     std::string confirmations;  ///< the same; may be empty
     StopSchedule schedule;
     std::string report;  ///< a file for what it did; empty: none
+    int lock = -1;       ///< descriptor that the guardian inherits; -1: none
 };
 
-/// How long a guardian tries a link that does not take the frames.
+/// How long a guardian tries a link that does not accept the frames, beside the time that its
+/// schedule takes.
 inline constexpr std::int64_t give_up_ns = 10'000'000'000;  // after the end of the process
 inline constexpr std::int64_t unload_ns = 2'000'000'000;    // the command waits for it
 
 class GuardianProcess {
 public:
-    GuardianProcess() = default;
-    ~GuardianProcess() { kill(); }
+    explicit GuardianProcess(GuardianArguments arguments) : arguments_(std::move(arguments)) {}
+    ~GuardianProcess() { child_.kill(); }
     GuardianProcess(const GuardianProcess&) = delete;
 
     /// Starts the process and waits until it has opened the link. Returns the problem, or "".
     /// [setup]
-    std::string start(const GuardianArguments& arguments);
+    std::string start();
+    /// Starts another one in place of one that has ended, or ends it first. It sends what the first
+    /// one has not sent, and all frames again when a reason to stop lasts. Returns the problem, or
+    /// "". Belongs to one thread at a time, which may wait; the memory stays the same.
+    std::string replace();
     GuardianMemory& memory() const noexcept { return *memory_; }
     /// Waits for its end, for at most `limit_ns`. Returns whether it has ended; called by a thread
     /// that may wait.
     bool has_ended_within(std::int64_t limit_ns) noexcept {
         return child_.has_ended_within(limit_ns);
     }
-    /// Continues a guardian that was suspended by a signal. [any]
+    /// Continues a guardian that was suspended by a signal. Belongs to the thread that replaces it.
     void resume() const noexcept { child_.resume(); }
-    /// Requests the stop frames and the end, and waits for it. Returns false when it had to be
-    /// killed. [setup]
+    /// Requests the stop frames and the end, and waits for it. Returns false when it has ended in
+    /// another way, or had to be killed. [setup]
     bool end(std::int64_t limit_ns) noexcept;
 
 private:
-    void kill() noexcept { child_.kill(); }
+    std::string start_process();
 
+    const GuardianArguments arguments_;
     bus::ChildProcess child_;
     GuardianMemory* memory_ = nullptr;
 };

@@ -2,13 +2,10 @@
 // hal-frame-guardian NAME LINK FRAMES CONFIRMATIONS ROUNDS EVERY_NS REPORT PARENT: sends the stop
 // frames of a link when the process PARENT ends, when no cycle of it runs, or when it asks for it.
 #include <poll.h>
-#include <sys/mman.h>
-#include <sys/stat.h>
 
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
-#include <cstring>
 #include <string>
 #include <utility>
 
@@ -34,13 +31,18 @@ public:
           address_(address),
           memory_(memory),
           transmitter_(transmitter),
-          parent_(std::move(parent)) {
+          parent_(std::move(parent)),
+          previous_(memory.record.read()),
+          reason_(previous_.reason),
+          stop_count_(memory.followed.load(std::memory_order_acquire)),
+          stops_(previous_.status.stops) {
         text_.reserve(4096);
     }
 
     /// Until there is nothing left to stop. Returns the exit code.
     int run() {
-        show(Phase::watching);
+        take_over(link::monotonic_ns());
+        memory_.start.accept();
         while (phase_ != Phase::ended) {
             const std::int64_t now = link::monotonic_ns();
             watch(now);
@@ -53,28 +55,48 @@ public:
     }
 
 private:
+    /// Begins where a guardian that was killed has left off: watch() finds a request that this one
+    /// had not followed to its end.
+    void take_over(std::int64_t now) {
+        const bool was_stopping = previous_.status.phase == Phase::stopping;
+        const bool is_requested = memory_.requests.newest().count != stop_count_;
+        if (!is_requested && (was_stopping || memory_.requests.holds_any())) {
+            begin(reason_, now);
+        } else {
+            show(Phase::watching);
+        }
+    }
+
     void show(Phase phase) {
         phase_ = phase;
-        memory_.rounds.store(transmitter_.rounds_sent(), std::memory_order_relaxed);
-        memory_.elapsed_ns.store(transmitter_.elapsed_ns(), std::memory_order_relaxed);
-        memory_.reason.store(static_cast<std::uint32_t>(reason_), std::memory_order_relaxed);
-        memory_.status.store(Status{phase, transmitter_.outcome(), stops_}.word(),
-                             std::memory_order_release);
+        is_ready_ = transmitter_.is_ready();
+        StopRecord record = previous_;
+        if (transmitter_.outcome() != Outcome::none) {
+            record.status.outcome = transmitter_.outcome();
+            record.status.failure = transmitter_.failure();
+            record.rounds = transmitter_.rounds_sent();
+            record.elapsed_ns = transmitter_.elapsed_ns();
+            record.unsent = transmitter_.unsent();
+        }
+        record.reason = reason_;
+        record.status.phase = phase;
+        record.status.is_ready = is_ready_;
+        record.status.sees_bus = transmitter_.sees_bus();
+        record.status.stops = stops_;
+        memory_.record.write(record);
     }
 
     /// Begins a stop for each of its reasons.
     void watch(std::int64_t now) {
-        const auto count = memory_.stop_count.load(std::memory_order_acquire);
-        if (count != stop_count_) {
-            stop_count_ = count;
-            begin(static_cast<StopReason>(memory_.stop_reason.load(std::memory_order_relaxed)),
-                  now);
+        const bus::StopRequests::Request request = memory_.requests.newest();
+        if (request.count != stop_count_) {
+            stop_count_ = request.count;
+            begin(request.reason, now);
         }
-        const std::uint64_t cycles = memory_.heartbeat.load(std::memory_order_relaxed);
-        // the frames were sent when the thread was stopped
-        const bool stands = (memory_.stop_held.load() & bit_of(StopReason::fault)) != 0;
-        switch (parent_.look(cycles, memory_.limit_ns.load(std::memory_order_relaxed),
-                             cycles != 0 && !stands, now)) {
+        // the frames were sent when the thread was stopped; read before the cycles (CycleCounter)
+        const bool stands = memory_.requests.holds(StopReason::fault);
+        const std::uint64_t cycles = memory_.cycles.count();
+        switch (parent_.look(cycles, memory_.cycles.limit_ns(), cycles != 0 && !stands, now)) {
         case bus::ParentWatch::Change::none: break;
         case bus::ParentWatch::Change::died: begin(StopReason::death, now); break;
         case bus::ParentWatch::Change::hangs: begin(StopReason::heartbeat, now); break;
@@ -93,21 +115,31 @@ private:
     /// Decides what comes behind the stop frames.
     void follow(std::int64_t now) {
         if (phase_ == Phase::stopping) {
-            show(transmitter_.is_over() ? Phase::stopped : Phase::stopping);
+            const bool is_over = transmitter_.is_over();
+            show(is_over ? Phase::stopped : Phase::stopping);
+            if (is_over) {
+                memory_.followed.store(stop_count_, std::memory_order_release);
+            }
+        } else if (transmitter_.is_ready() != is_ready_) {
+            show(phase_);
         }
         // a request that came behind watch() is begun first
-        const bool is_ending = memory_.ending.load(std::memory_order_acquire) != 0 &&
-                               memory_.stop_count.load(std::memory_order_acquire) == stop_count_;
+        const bool is_ending =
+            memory_.requests.is_ending() && memory_.requests.newest().count == stop_count_;
         if (parent_.is_dead() || is_ending) {
-            const std::int64_t limit = parent_.is_dead() ? give_up_ns : unload_ns;
-            if (phase_ == Phase::stopped || now - begun_ns_ > limit) {
+            if (phase_ == Phase::stopped || now - begun_ns_ > limit_ns()) {
                 finish();
             }
-        } else if (phase_ == Phase::stopped && !parent_.hangs() &&
-                   memory_.stop_held.load(std::memory_order_acquire) == 0) {
+        } else if (phase_ == Phase::stopped && !parent_.hangs() && !memory_.requests.holds_any()) {
             had_hung_ = false;
             show(Phase::watching);
         }
+    }
+
+    /// Returns how long the last stop may take.
+    std::int64_t limit_ns() const {
+        const std::int64_t tries_ns = parent_.is_dead() ? give_up_ns : unload_ns;
+        return transmitter_.schedule().duration_ns() + tries_ns;
     }
 
     void wait(std::int64_t ns) {
@@ -129,30 +161,34 @@ private:
     }
 
     void describe() {
-        char part[160];
         const std::uint32_t rounds = transmitter_.rounds_sent();
         if (rounds == 0) {
-            std::snprintf(part, sizeof part, "the stop frames were not sent: %s is %s", address_,
-                          transmitter_.link_state());
-            text_ += part;
+            text_ += "the stop frames were not sent on ";
+            text_ += address_;
+            append_failure(": ");
             return;
         }
-        std::snprintf(part, sizeof part, "the stop frames were sent %u time%s", rounds,
-                      rounds == 1 ? "" : "s");
+        char part[160];
+        std::snprintf(part, sizeof part, "the stop frames were %s %u time%s",
+                      sent_text(transmitter_.sees_bus()), rounds, rounds == 1 ? "" : "s");
         text_ += part;
         switch (transmitter_.outcome()) {
         case Outcome::confirmed: text_ += " and confirmed"; break;
         case Outcome::unconfirmed: text_ += " and not confirmed"; break;
         case Outcome::sending:
-        case Outcome::delayed:
-            text_ += "; then the link was ";
-            text_ += transmitter_.link_state();
-            break;
+        case Outcome::delayed: append_failure(", then no more: "); break;
         default: break;
         }
         std::snprintf(part, sizeof part, "; %.1f ms",
                       static_cast<double>(transmitter_.elapsed_ns()) * 1e-6);
         text_ += part;
+    }
+
+    /// Of the last attempt, if it has failed by now.
+    void append_failure(const char* before) {
+        if (transmitter_.failure() == Failure::none) return;
+        text_ += before;
+        append_unsent(text_, transmitter_.frames(), transmitter_.unsent(), transmitter_.failure());
     }
 
     const char* name_;
@@ -161,32 +197,16 @@ private:
     GuardianMemory& memory_;
     StopTransmitter& transmitter_;
     bus::ParentWatch parent_;
-    Phase phase_ = Phase::starting;
-    StopReason reason_ = StopReason::none;
+    const StopRecord previous_;  // of a guardian that was killed
+    Phase phase_ = Phase::watching;
+    StopReason reason_;
+    bool is_ready_ = false;
     bool had_hung_ = false;  // before the end of the process
-    std::uint32_t stop_count_ = 0;
-    std::uint32_t stops_ = 0;
+    std::uint32_t stop_count_;
+    std::uint32_t stops_;
     std::int64_t begun_ns_ = 0;
     std::string text_;
 };
-
-/// Ends the start with a reason for the component.
-int reject(GuardianMemory& memory, const std::string& problem) {
-    std::strncpy(memory.problem.data(), problem.c_str(), memory.problem.size() - 1);
-    memory.status.store(Status{Phase::ended}.word(), std::memory_order_release);
-    return 1;
-}
-
-GuardianMemory* map_memory() {
-    struct stat memory{};
-    if (fstat(bus::guardian_memory_fd, &memory) != 0 ||
-        static_cast<std::size_t>(memory.st_size) != sizeof(GuardianMemory)) {
-        return nullptr;
-    }
-    void* const mapped = mmap(nullptr, sizeof(GuardianMemory), PROT_READ | PROT_WRITE,
-                              MAP_SHARED | MAP_POPULATE, bus::guardian_memory_fd, 0);
-    return mapped == MAP_FAILED ? nullptr : static_cast<GuardianMemory*>(mapped);
-}
 
 }  // namespace
 
@@ -200,18 +220,29 @@ int main(int argc, char** argv) {
     }
     bus::ignore_signals();
     link::Descriptor parent = bus::open_parent(argv[8]);
-    if (!parent) return 1;  // it has ended already: nothing was started
-    GuardianMemory* const memory = map_memory();
+    auto* const memory =
+        static_cast<GuardianMemory*>(bus::map_guardian_memory(sizeof(GuardianMemory)));
     if (memory == nullptr) return 1;
+    // one that replaces another stops the devices also when the process has ended meanwhile
+    if (!parent && memory->cycles.count() == 0) return 1;
 
     StopFrames frames;
     std::string problem = parse(argv[3], argv[4], frames);
-    if (!problem.empty()) return reject(*memory, problem);
+    if (!problem.empty()) return memory->start.reject(problem);
     const StopSchedule schedule{.rounds = static_cast<std::uint32_t>(std::atoi(argv[5])),
                                 .every_ns = std::atoll(argv[6])};
     StopTransmitter transmitter(std::move(frames), schedule);
     problem = transmitter.open(argv[2]);
-    if (!problem.empty()) return reject(*memory, problem);
+    if (!problem.empty()) {
+        if (!parent) {
+            bus::report_end(argv[1], argv[7],
+                            bus::report_time() +
+                                "the process has ended; the stop frames were not "
+                                "sent on " +
+                                argv[2] + ": " + problem);
+        }
+        return memory->start.reject(problem);
+    }
     bus::be_resident();
     Guardian guardian(argv[1], argv[7], argv[2], *memory, transmitter, std::move(parent));
     return guardian.run();

@@ -76,6 +76,10 @@ std::string parse_can_frames(std::string_view list, std::vector<can::Frame>& fra
 }
 
 std::string parse(std::string_view frames, std::string_view confirmations, StopFrames& parsed) {
+    for_each_part(frames, [&](std::string_view part) {
+        parsed.texts.emplace_back(part);
+        return std::string();
+    });
     if (frames.find('#') == frames.npos) {
         if (!confirmations.empty()) return "confirmations of Ethernet frames are not supported";
         return for_each_part(frames, [&](std::string_view part) {

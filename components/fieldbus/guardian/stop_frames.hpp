@@ -21,6 +21,7 @@ struct StopFrames {
     std::vector<std::vector<std::uint8_t>> ethernet;
     /// CAN: what devices send once they have stopped; data of a received frame may be longer
     std::vector<can::Frame> confirmations;
+    std::vector<std::string> texts;  ///< of the frames to send, as they were declared
 
     std::size_t size() const noexcept { return can.size() + ethernet.size(); }
 };

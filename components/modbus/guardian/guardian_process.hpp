@@ -17,6 +17,7 @@ struct GuardianArguments {
     std::string file;     ///< of the configuration, for messages
     std::string link;
     std::string report;  ///< a file for what it did; empty: none
+    int lock = -1;       ///< descriptor that the guardian inherits; -1: none
 };
 
 class GuardianProcess {

@@ -5,15 +5,12 @@
 // Three things end the exchange, whichever is first: `ending` in the image (unload), the end of the
 // process (pidfd), and missing cycles (the heartbeat). Only the last one sees a process that hangs
 // or is suspended. A process that is killed before this one runs has never been able to write: the
-// component waits for Phase::running.
+// component waits for StartState::accept().
 #include <poll.h>
-#include <sys/mman.h>
-#include <sys/stat.h>
 #include <time.h>
 
 #include <algorithm>
 #include <cstdio>
-#include <cstring>
 #include <string>
 
 #include "bus/guardian/parent_watch.hpp"
@@ -51,17 +48,17 @@ public:
         master_.attach(line_, link::monotonic_ns());
         image_.header().phase.store(static_cast<std::uint32_t>(Phase::running),
                                     std::memory_order_release);
+        image_.header().start.accept();
         while (true) {
             const std::int64_t now = link::monotonic_ns();
             watch(now);
             image_.header().turns.fetch_add(1, std::memory_order_relaxed);
             // read before work(), which then follows the stop that was requested before
-            const bool is_ending = image_.header().ending.load(std::memory_order_acquire) != 0;
+            const bool is_ending = image_.header().requests.is_ending();
             const std::int64_t next = master_.work(now);
             if (master_.is_stopped()) {
                 if (parent_.is_dead() || is_ending) return finish(now);
-                if (!parent_.hangs() &&
-                    image_.header().stop_held.load(std::memory_order_acquire) == 0) {
+                if (!parent_.hangs() && !image_.header().requests.holds_any()) {
                     master_.release();
                 }
             }
@@ -72,14 +69,15 @@ public:
 private:
     void watch(std::int64_t now) {
         const ImageHeader& header = image_.header();
-        switch (parent_.look(header.heartbeat.load(std::memory_order_relaxed),
-                             header.limit_ns.load(std::memory_order_relaxed),
-                             header.outputs_valid.load(std::memory_order_acquire) != 0, now)) {
+        // before the cycles: a thread that runs again counts one before its outputs are valid
+        const bool has_outputs = header.outputs_valid.load(std::memory_order_acquire) != 0;
+        const std::uint64_t cycles = header.cycles.count();
+        switch (parent_.look(cycles, header.cycles.limit_ns(), has_outputs, now)) {
         case bus::ParentWatch::Change::none: break;
         case bus::ParentWatch::Change::died: begin(StopReason::death, now); break;
         case bus::ParentWatch::Change::hangs:
             // a stop that precedes the end must not begin anew because its machine runs no cycles
-            if (header.ending.load(std::memory_order_acquire) == 0) {
+            if (!header.requests.is_ending()) {
                 begin(StopReason::heartbeat, now);
             }
             break;
@@ -163,14 +161,6 @@ line::Opened open_line(const char* address, const line::Options& options) {
     }
 }
 
-/// Ends the start with a reason for the component.
-int reject(const Image& image, const std::string& problem) {
-    ImageHeader& header = image.header();
-    std::strncpy(header.problem.data(), problem.c_str(), header.problem.size() - 1);
-    header.phase.store(static_cast<std::uint32_t>(Phase::ended), std::memory_order_release);
-    return 1;
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -183,19 +173,13 @@ int main(int argc, char** argv) {
     if (!parent) return 1;  // it has ended already: nothing was written
 
     const ReadResult config = read(bus::read_guardian_text(), argv[2]);
-    struct stat memory{};
     const Plan plan = make_plan(config.bus);
-    const std::size_t size = Image::size_of(config.bus, plan);
-    if (!config.good() || fstat(bus::guardian_memory_fd, &memory) != 0 ||
-        static_cast<std::size_t>(memory.st_size) != size) {
-        return 1;
-    }
-    void* const mapped = mmap(nullptr, size, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_POPULATE,
-                              bus::guardian_memory_fd, 0);
-    if (mapped == MAP_FAILED) return 1;
-    const Image image(mapped, config.bus, plan, false);
+    if (!config.good()) return 1;
+    void* const memory = bus::map_guardian_memory(Image::size_of(config.bus, plan));
+    if (memory == nullptr) return 1;
+    const Image image(memory, config.bus, plan, false);
     auto opened = open_line(argv[3], config.bus.line);
-    if (!opened) return reject(image, opened.problem);
+    if (!opened) return image.header().start.reject(opened.problem);
     bus::be_resident();
     Guardian guardian(argv[1], argv[4], config.bus, plan, image, *opened.line, std::move(parent));
     return guardian.run();

@@ -52,16 +52,6 @@ inline constexpr bus::EventRow<Event> event_rows[] = {
 };
 static_assert(bus::in_order(event_rows));
 
-inline const char* to_string(StopReason reason) {
-    constexpr const char* texts[] = {"none",
-                                     "the component is unloaded",
-                                     "the thread was stopped or has a fault",
-                                     "the pin estop is TRUE",
-                                     "no cycle has run",
-                                     "the process has ended"};
-    return texts[static_cast<std::size_t>(reason)];
-}
-
 /// Formats the events of a bus. All functions but fault() are [setup].
 class EventTexts {
 public:
@@ -107,7 +97,7 @@ private:
                        : "repair the line, or write confirm = no for this slave";
         }
         if (name == "link") return bus_.link;
-        if (name == "reason") return to_string(static_cast<StopReason>(r.value));
+        if (name == "reason") return bus::to_string(static_cast<StopReason>(r.value));
         if (name == "time") {
             char text[32];
             std::snprintf(text, sizeof text, "%.1f ms", static_cast<double>(r.value) * 1e-6);

@@ -12,6 +12,9 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "bus/guardian/cycle_counter.hpp"
+#include "bus/guardian/start_state.hpp"
+#include "bus/guardian/stop_requests.hpp"
 #include "modbus/config/plan.hpp"
 
 namespace hal::modbus {
@@ -40,15 +43,7 @@ enum class Event : std::uint8_t {
     values_accepted,  ///< all of the slave again
 };
 
-/// Why the drives are stopped.
-enum class StopReason : std::uint32_t {
-    none,
-    unload,  ///< the component ends
-    fault,  ///< the thread was stopped, or a fault
-    estop,  ///< the pin estop
-    heartbeat,  ///< no cycle
-    death,  ///< the process ended
-};
+using bus::StopReason;
 
 struct EventRecord {
     Event event = Event::slave_online;
@@ -94,16 +89,11 @@ struct ImageHeader {
     static constexpr std::size_t slave_words = 4;  ///< a bit of each slave
 
     // written by the cycle
-    alignas(64) std::atomic<std::uint64_t> heartbeat{0};  ///< cycles
-    std::atomic<std::int64_t> limit_ns{0};  ///< longest time between two cycles
+    bus::CycleCounter cycles;
     std::atomic<std::uint32_t> outputs_valid{0};  ///< the cycle has written all outputs
     std::atomic<std::uint32_t> event_tail{0};
     // written by any thread of the runtime
-    /// requests to stop, for those that were short
-    alignas(64) std::atomic<std::uint32_t> stop_count{0};
-    std::atomic<std::uint32_t> stop_reason{0};  ///< of the last request
-    std::atomic<std::uint32_t> stop_held{0};  ///< StopReason bits that last
-    std::atomic<std::uint32_t> ending{0};  ///< stop, then end
+    bus::StopRequests requests;
     // written by the engine; each cycle reads this line
     alignas(64) std::atomic<std::uint32_t> phase{0};
     std::atomic<std::uint32_t> event_head{0};
@@ -114,11 +104,10 @@ struct ImageHeader {
     std::array<std::atomic<std::uint64_t>, slave_words> changed{};
     // written by the engine
     alignas(64) std::atomic<std::uint32_t> events_lost{0};
-    std::atomic<std::uint32_t> stops_followed{0};  ///< of `stop_count`
+    std::atomic<std::uint32_t> stops_followed{0};  ///< of StopRequests::Request::count
     std::atomic<std::uint32_t> line_open{0};
     std::atomic<std::uint32_t> broadcasts{0};  ///< broadcast stops
-    /// why the guardian could not start; written before Phase::ended
-    std::array<char, 256> problem{};
+    bus::StartState start;
     std::array<EventRecord, event_capacity> events{};
 };
 static_assert(ImageHeader::slave_words * 64 >= max_unit, "a bus has a slave of each address");
@@ -191,14 +180,11 @@ public:
         return header_->changed[n].exchange(0, std::memory_order_acquire);
     }
     /// Requests a stop. [any]
-    void stop(StopReason reason) const noexcept {
-        header_->stop_reason.store(static_cast<std::uint32_t>(reason), std::memory_order_relaxed);
-        header_->stop_count.fetch_add(1, std::memory_order_release);
-    }
+    void stop(StopReason reason) const noexcept { header_->requests.request(reason); }
     /// Returns whether the last requested stop is over. [any]
     bool has_stopped() const noexcept {
         return header_->stops_followed.load(std::memory_order_acquire) ==
-                   header_->stop_count.load(std::memory_order_acquire) &&
+                   header_->requests.newest().count &&
                header_->phase.load(std::memory_order_acquire) ==
                    static_cast<std::uint32_t>(Phase::stopped);
     }

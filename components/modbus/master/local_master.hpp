@@ -40,9 +40,7 @@ private:
     std::int64_t work(std::int64_t now_ns) noexcept {
         const ImageHeader& header = image_.header();
         const std::int64_t next = master_.work(now_ns);
-        const bool holds = header.stop_held.load(std::memory_order_acquire) != 0 ||
-                           header.ending.load(std::memory_order_acquire) != 0;
-        if (!holds && master_.is_stopped()) {
+        if (!header.requests.holds_any() && master_.is_stopped()) {
             master_.release();
         }
         return next;

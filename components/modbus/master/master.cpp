@@ -198,12 +198,11 @@ void Master::release() noexcept {
 }
 
 void Master::follow_requests(std::int64_t now_ns) noexcept {
-    const std::uint32_t count = image_.header().stop_count.load(std::memory_order_acquire);
-    if (count == stop_seen_) return;
-    stop_seen_ = count;
-    stop(static_cast<StopReason>(image_.header().stop_reason.load(std::memory_order_relaxed)),
-         now_ns);
-    image_.header().stops_followed.store(count, std::memory_order_release);
+    const bus::StopRequests::Request request = image_.header().requests.newest();
+    if (request.count == stop_seen_) return;
+    stop_seen_ = request.count;
+    stop(request.reason, now_ns);
+    image_.header().stops_followed.store(request.count, std::memory_order_release);
 }
 
 /// Returns false while the line is lost.

@@ -220,7 +220,7 @@ private:
     bool stopping_ = false;
     bool held_ = false;
     std::int64_t stop_at_ns_ = 0;
-    std::uint32_t stop_seen_ = 0;  // ImageHeader::stop_count
+    std::uint32_t stop_seen_ = 0;  // StopRequests::Request::count
     std::uint32_t stop_turn_ = 0;
     Broadcast broadcast_ = Broadcast::none;
     std::size_t broadcast_next_ = 0;  // telegram

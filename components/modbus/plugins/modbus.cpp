@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: MIT
-#include <dlfcn.h>
-
 #include <bit>
 #include <deque>
-#include <filesystem>
 
 #include "bus/component/bus_component.hpp"
+#include "bus/guardian/program_path.hpp"
 #include "bus/guardian/report.hpp"
+#include "bus/guardian/report_lock.hpp"
 #include "hal/background.hpp"
 #include "hal/reporter.hpp"
 #include "hal/setup_time.hpp"
@@ -95,18 +94,17 @@ struct Modbus : hal::bus::BusComponent {
         has_image_ = false;
         local_.reset();
         guardian_.reset();
+        lock_.release();
     }
 
     void receive(hal::Cycle cycle) noexcept {
         if (!has_image_) return;
         const std::int64_t now = cycle.start_ns();
         ImageHeader& header = image_.header();
-        header.limit_ns.store(std::max(arguments_.bus.heartbeat_ns, 3 * cycle.period_ns()),
-                              std::memory_order_relaxed);
-        header.heartbeat.fetch_add(1, std::memory_order_release);
+        header.cycles.count(std::max(arguments_.bus.heartbeat_ns, 3 * cycle.period_ns()));
         const hal::bus::Turn turn = receive_turn(cycle);
         if (begins_anew(turn)) {
-            header.stop_held.fetch_and(~bit_of(StopReason::fault), std::memory_order_release);
+            header.requests.release(StopReason::fault);
             for (SlavePins* drive : drives_) {
                 drive->require_edge();
             }
@@ -132,7 +130,7 @@ struct Modbus : hal::bus::BusComponent {
         const bool may_run = exchanges() &&
                              header.phase.load(std::memory_order_acquire) ==
                                  static_cast<std::uint32_t>(Phase::running) &&
-                             header.stop_held.load(std::memory_order_relaxed) == 0;
+                             !header.requests.holds_any();
         bool invalid = set_points_.transmit(image_);
         for (SlavePins* drive : drives_) {
             invalid = drive->command(image_, now, may_run) || invalid;
@@ -143,7 +141,7 @@ struct Modbus : hal::bus::BusComponent {
 
     void make_safe(hal::Cycle) noexcept {
         if (!has_image_) return;
-        image_.header().stop_held.fetch_or(bit_of(StopReason::fault), std::memory_order_release);
+        image_.header().requests.hold(StopReason::fault);
         image_.header().outputs_valid.store(0, std::memory_order_release);
         image_.stop(StopReason::fault);
         interrupt();
@@ -173,38 +171,36 @@ private:
         }
     }
 
-    static constexpr std::uint32_t bit_of(StopReason reason) {
-        return std::uint32_t{1} << static_cast<std::uint32_t>(reason);
-    }
-
     // --- The master, in this process or in the guardian
 
-    /// It stands below the folder of the drivers' library; the plugin itself may be loaded from
-    /// memory.
-    static std::string guardian_program() {
-        Dl_info info{};
-        dladdr(reinterpret_cast<const void*>(
-                   static_cast<hal::line::Description (*)(std::string_view)>(&hal::line::describe)),
-               &info);
-        const std::filesystem::path library = info.dli_fname != nullptr ? info.dli_fname : "";
-        std::error_code none;
-        return (std::filesystem::weakly_canonical(library, none).parent_path() / "halcyon" /
-                "hal-guardian")
-            .string();
+    static std::string program() {
+        return hal::bus::guardian_program(
+            reinterpret_cast<const void*>(
+                static_cast<hal::line::Description (*)(std::string_view)>(&hal::line::describe)),
+            "hal-guardian");
     }
 
     void start_guardian() {
         const std::string& link = arguments_.bus.link;
         const std::string report = hal::bus::report_file(link);
-        previous_report_ = hal::bus::take_report(report);
+        if (const std::string problem = lock_.acquire(report, link); !problem.empty()) {
+            throw std::runtime_error(problem);
+        }
         guardian_ = std::make_unique<GuardianProcess>();
         const std::string problem =
-            guardian_->start({guardian_program(), name_, arguments_.config.get(), link, report},
+            guardian_->start({.program = program(),
+                              .name = name_,
+                              .file = arguments_.config.get(),
+                              .link = link,
+                              .report = report,
+                              .lock = lock_.descriptor()},
                              arguments_.text, arguments_.bus, arguments_.plan);
         if (!problem.empty()) {
             guardian_.reset();
+            lock_.release();
             throw std::runtime_error(problem);
         }
+        previous_report_ = hal::bus::take_report(report);  // now that nothing prevents its print
         image_ = guardian_->image();
         has_image_ = true;
         if (!previous_report_.empty()) {
@@ -230,8 +226,11 @@ private:
         bool has_started = false;
         try {
             has_started = another
-                              .start({guardian_program(), name_, arguments_.config.get(),
-                                      arguments_.bus.link, ""},
+                              .start({.program = program(),
+                                      .name = name_,
+                                      .file = arguments_.config.get(),
+                                      .link = arguments_.bus.link,
+                                      .report = {}},
                                      arguments_.text, arguments_.bus, arguments_.plan)
                               .empty();
         } catch (...) {  // out of memory
@@ -268,8 +267,7 @@ private:
     /// slaves of a simulation end with the machine.
     void stop_local() noexcept {
         if (is_virtual_ || !arguments_.bus.has_stops()) return;
-        image_.header().ending.store(1, std::memory_order_release);
-        image_.stop(StopReason::unload);
+        image_.header().requests.end();
         const std::int64_t limit = stop_limit_ns(arguments_.plan, arguments_.bus);
         const std::int64_t begin = hal::link::monotonic_ns();
         while (!image_.has_stopped()) {
@@ -395,10 +393,10 @@ private:
     void follow_estop() noexcept {
         ImageHeader& header = image_.header();
         if (estop && !was_estop_) {
-            header.stop_held.fetch_or(bit_of(StopReason::estop), std::memory_order_release);
+            header.requests.hold(StopReason::estop);
             image_.stop(StopReason::estop);
         } else if (!estop && was_estop_) {
-            header.stop_held.fetch_and(~bit_of(StopReason::estop), std::memory_order_release);
+            header.requests.release(StopReason::estop);
         }
         was_estop_ = estop;
     }
@@ -448,6 +446,7 @@ private:
     Image image_;
     bool has_image_ = false;
     std::unique_ptr<LocalMaster> local_;
+    hal::bus::ReportLock lock_;
     std::unique_ptr<GuardianProcess> guardian_;
     hal::Background background_{[this](std::int64_t now, bool may_wait) { turn(now, may_wait); }};
     std::atomic<bool> is_alive_{true};  // written by the background thread

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // What a guardian leaves for the next start, also when the disk is full.
+#include <fcntl.h>
 #include <gtest/gtest.h>
 
 #include <csignal>
@@ -11,6 +12,7 @@
 #include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/un.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include "components/bus/guardian/report.hpp"
@@ -70,6 +72,28 @@ TEST_F(GuardianReport, states_that_it_is_lost) {
 TEST_F(GuardianReport, that_cannot_be_kept_is_known) {
     EXPECT_FALSE(hal::bus::keep_report((folder / "none/report").c_str(), "text"));
     EXPECT_TRUE(hal::bus::keep_report("", "text")) << "there is no folder for it";
+}
+
+TEST_F(GuardianReport, is_in_its_file_before_it_is_printed) {
+    int output[2];
+    ASSERT_EQ(::pipe2(output, O_NONBLOCK | O_CLOEXEC), 0);
+    while (::write(output[1], "full", 4) > 0) {
+    }
+    const pid_t guardian = ::fork();
+    ASSERT_GE(guardian, 0);
+    if (guardian == 0) {
+        ::dup2(output[1], STDERR_FILENO);  // nobody reads it
+        hal::bus::report_end("guard", file.c_str(), "the process has ended; 1.0 ms");
+        ::_exit(0);
+    }
+    std::string report;
+    while (report.empty() && ::waitpid(guardian, nullptr, WNOHANG) == 0) {
+        report = hal::bus::take_report(file);
+    }
+    EXPECT_EQ(report, "the process has ended; 1.0 ms") << "only once it was printed, or not at all";
+    EXPECT_EQ(::waitpid(guardian, nullptr, 0), guardian) << "a reader that hangs keeps it for ever";
+    ::close(output[0]);
+    ::close(output[1]);
 }
 
 TEST_F(GuardianReport, reaches_the_systems_log) {

@@ -65,7 +65,7 @@ TEST_P(ProfileTest, Drive_runs_both_ways_and_stops) {
     EXPECT_NEAR(w.real("speed-fb"), 3000, 4);
 
     // the stop telegrams of the profile, and no command behind them
-    w.image.header().stop_held.store(1);
+    w.image.header().requests.hold(StopReason::estop);
     w.image.stop(StopReason::estop);
     w.run(3 * second);
     EXPECT_EQ(slave.stopped.load(), 1U);
@@ -136,7 +136,7 @@ TEST(Drive, Stop_telegrams_are_those_of_the_manuals) {
             return std::make_unique<RecordedLine>(std::move(line), frames);
         });
         w.run(500 * ms);
-        w.image.header().stop_held.store(1);
+        w.image.header().requests.hold(StopReason::estop);
         frames.clear();
         w.image.stop(StopReason::death);
         w.run(300 * ms);
@@ -342,7 +342,7 @@ TEST(Master, Stop_waits_for_at_most_the_telegram_on_the_line) {
         "[bus]\nlink = sim:x\nbaud = 19200\n[slave 1 s]\nread a = holding 0 every 10ms\n"
         "write c = holding 50\nstop = holding 50 7\n");
     w.run(500 * ms);
-    w.image.header().stop_held.store(1);
+    w.image.header().requests.hold(StopReason::estop);
     w.image.stop(StopReason::death);
     const std::int64_t since = w.now;
     while (w.image.slave(0).stopped.load() == 0 && w.now - since < second) {
@@ -378,10 +378,10 @@ struct Stop : testing::Test {
         set(50, 1);
     }
     void stop() {
-        w.image.header().stop_held.store(1);
+        w.image.header().requests.hold(StopReason::estop);
         w.image.stop(StopReason::estop);
     }
-    void release() { w.image.header().stop_held.store(0); }
+    void release() { w.image.header().requests.release(StopReason::estop); }
     void fail(FaultKind kind) {
         SlaveFault fault;
         fault.kind = kind;
@@ -526,7 +526,7 @@ struct BroadcastStop : testing::Test {
         frames.clear();
     }
     void stop() {
-        w.image.header().stop_held.store(1);
+        w.image.header().requests.hold(StopReason::estop);
         w.image.stop(StopReason::estop);
     }
     int get(std::size_t slave) {
@@ -607,7 +607,7 @@ TEST_F(BroadcastStop, Is_sent_once_more_by_each_further_stop) {
     start();
     stop();
     w.run(second);
-    w.image.header().stop_held.store(0);
+    w.image.header().requests.release(StopReason::estop);
     w.run(second);
     EXPECT_EQ(w.image.header().phase.load(), static_cast<std::uint32_t>(Phase::running));
     stop();
@@ -676,7 +676,7 @@ std::pair<std::int64_t, std::int64_t> time_of_stop(const std::string& text) {
     w.run(second);
     w.slaves->faults().push_back({});
     w.run(100 * ms);
-    w.image.header().stop_held.store(1);
+    w.image.header().requests.hold(StopReason::estop);
     w.image.stop(StopReason::unload);
     const std::int64_t begin = w.now;
     do {
@@ -707,7 +707,7 @@ TEST(Master, Stop_with_a_rejected_telegram_is_not_acknowledged) {
     World w(bus + "write c = holding 50\nstop = holding 500 1, holding 50 7\n",
             bus + "write c = holding 50\n");
     w.run(second);
-    w.image.header().stop_held.store(1);
+    w.image.header().requests.hold(StopReason::estop);
     w.image.stop(StopReason::estop);
     w.run(3 * second);
     EXPECT_EQ(w.slaves->slaves()[0].get(Table::holding, 50), 7) << "the further telegrams are sent";
@@ -729,7 +729,7 @@ TEST(Master, Stop_of_offline_slaves_leaves_three_quarters_of_the_line) {
         w.slaves->faults().push_back(fault);
     }
     w.run(2 * second);
-    w.image.header().stop_held.store(1);
+    w.image.header().requests.hold(StopReason::estop);
     w.image.stop(StopReason::estop);
     w.run(4 * second);
     const std::uint64_t before = w.image.header().telegrams.load();
@@ -868,7 +868,7 @@ TEST(Master, Echo_of_a_request_is_not_its_answer) {
     EXPECT_EQ(w.image.slave(0).errors.load(), 0U);
     EXPECT_EQ(w.image.slave(0).timeouts.load(), 0U);
     EXPECT_EQ(w.image.slave(1).online.load(), 0U);
-    w.image.header().stop_held.store(1);
+    w.image.header().requests.hold(StopReason::estop);
     w.image.stop(StopReason::estop);
     w.run(3 * second);
     EXPECT_EQ(w.image.slave(0).stopped.load(), 1U);
@@ -887,7 +887,7 @@ TEST(Master, Echo_of_a_write_is_not_its_answer_on_a_line_without_reads) {
                 w.slaves->faults().push_back({});
             }
             const auto stop = [&] {
-                w.image.header().stop_held.store(1);
+                w.image.header().requests.hold(StopReason::estop);
                 w.image.stop(StopReason::estop);
             };
             if (stops_first) {

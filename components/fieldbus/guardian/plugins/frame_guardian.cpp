@@ -3,12 +3,14 @@
 #include <cstdio>
 #include <iterator>
 #include <memory>
+#include <mutex>
 #include <stdexcept>
 #include <string>
 #include <string_view>
 
 #include "bus/guardian/program_path.hpp"
 #include "bus/guardian/report.hpp"
+#include "bus/guardian/report_lock.hpp"
 #include "fieldbus/guardian/guardian_process.hpp"
 #include "fieldbus/guardian/stop_events.hpp"
 #include "hal/background.hpp"
@@ -24,13 +26,14 @@ namespace {
 using namespace hal::guardian;
 
 constexpr std::int64_t millisecond = 1'000'000;
+constexpr std::int64_t turn_ns = 20 * millisecond;    // of the background thread
 constexpr std::int64_t stall_ns = 500 * millisecond;  // of the guardian, whose turns take 5 ms
+constexpr std::int64_t stuck_ns = 1500 * millisecond;
+constexpr std::int64_t replace_ns = 1000 * millisecond;  // between two attempts
 
 struct EventRecord {
     Event event = Event::stopping;
-    StopReason reason = StopReason::none;
-    std::uint32_t rounds = 0;
-    std::int64_t elapsed_ns = 0;
+    StopRecord stop;
 };
 
 /// What a cycle shows.
@@ -57,6 +60,7 @@ struct FrameGuardian : hal::Component {
         if (!problem.empty()) throw hal::ArgumentError("send", "send: " + problem);
         problem = parse(frames_.get(), confirmations_.get(), parsed_ = {});
         if (!problem.empty()) throw hal::ArgumentError("confirm", "confirm: " + problem);
+        check_duration();
     }
 
     void start() {
@@ -81,9 +85,10 @@ struct FrameGuardian : hal::Component {
         } else {
             start_guardian();
         }
-        shown_ = Status{Phase::watching};
+        shown_ = {};
+        told_stall_ = false;
         silent_ns_ = 0;
-        last_ns_ = 0;
+        acknowledged_stop_ = 0;
         reporter_.start();
         background_.start();
     }
@@ -92,7 +97,7 @@ struct FrameGuardian : hal::Component {
         background_.stop();
         if (local_) {
             setup_time_.expect(local_->closing_ns(), hal::can::closing_text);
-            own_memory_.stop(StopReason::unload);
+            own_memory_.requests.request(StopReason::unload);
             work_local(local_ns_);
             report_outcome();
             local_.reset();
@@ -103,14 +108,14 @@ struct FrameGuardian : hal::Component {
 
     void update(hal::Cycle cycle) noexcept {
         GuardianMemory& memory = this->memory();
-        memory.limit_ns.store(
-            std::max<std::int64_t>(heartbeat_ms_ * millisecond, 3 * cycle.period_ns()),
-            std::memory_order_relaxed);
-        if (is_interrupted_.exchange(false, std::memory_order_acquire)) {
-            memory.stop_held.fetch_and(~bit_of(StopReason::fault), std::memory_order_release);
-        }
         follow_estop(memory);
-        memory.heartbeat.fetch_add(1, std::memory_order_release);
+        const std::int64_t limit_ns =
+            std::max<std::int64_t>(heartbeat_ms_ * millisecond, 3 * cycle.period_ns());
+        memory.cycles.count(limit_ns);
+        if (is_interrupted_.exchange(false, std::memory_order_acquire)) {
+            memory.requests.release(StopReason::fault);  // behind the count: CycleCounter
+        }
+        safe_cycle_.store(0, std::memory_order_relaxed);
         std::uint64_t seen = look(cycle).word();
         hal::link::JournaledCall call;
         if (has_guardian_) {
@@ -122,10 +127,12 @@ struct FrameGuardian : hal::Component {
     void make_safe(hal::Cycle cycle) noexcept {
         is_interrupted_.store(true, std::memory_order_release);
         GuardianMemory& memory = this->memory();
-        constexpr std::uint32_t own = bit_of(StopReason::fault);
-        const auto held = memory.stop_held.fetch_or(own, std::memory_order_release);
-        if ((held & own) == 0) {
-            memory.stop(StopReason::fault);
+        const bool is_new = memory.requests.hold(StopReason::fault);
+        // a thread that was started again, and had commanded the devices before it came to update()
+        const std::uint64_t number = cycle.number();
+        const bool has_run = number > safe_cycle_.exchange(number, std::memory_order_relaxed);
+        if (is_new || has_run) {
+            memory.requests.request(StopReason::fault);
         }
         if (local_) {
             work_local(cycle.start_ns());
@@ -135,6 +142,17 @@ struct FrameGuardian : hal::Component {
 private:
     /// Of the guardian; without one, of the component.
     GuardianMemory& memory() noexcept { return guardian_ ? guardian_->memory() : own_memory_; }
+
+    void check_duration() const {
+        const std::int64_t duration_ms = repeat_ * every_ms_;
+        constexpr std::int64_t max_ms = max_duration_ns / millisecond;
+        if (duration_ms <= max_ms) return;
+        throw hal::ArgumentError(
+            "repeat", "repeat=" + std::to_string(repeat_) + " every_ms=" +
+                          std::to_string(every_ms_) + " takes " + std::to_string(duration_ms) +
+                          " ms, and a stop takes at most 60000 ms; write repeat=" +
+                          std::to_string(max_ms / every_ms_) + ", or a shorter every_ms=");
+    }
 
     bool is_in_memory() const {
         if (!parsed_.ethernet.empty()) {
@@ -153,35 +171,40 @@ private:
         local_ = std::make_unique<StopTransmitter>(parsed_, schedule());
         const std::string problem = local_->open(link_.get());
         if (!problem.empty()) throw std::runtime_error(problem);
-        own_stops_ = {};
-        own_memory_.stop_held.store(0);
-        stop_count_ = own_memory_.stop_count.load();
+        own_stop_ = {};
+        own_memory_.requests.release(StopReason::fault);
+        own_memory_.requests.release(StopReason::estop);
+        stop_count_ = own_memory_.requests.newest().count;
+        was_estop_ = false;
     }
 
     /// What a guardian does in its turns. [realtime]
     void work_local(std::int64_t now) noexcept {
         local_ns_ = now;
-        const std::uint32_t count = own_memory_.stop_count.load(std::memory_order_acquire);
-        if (count != stop_count_) {
-            stop_count_ = count;
-            ++own_stops_.stops;
-            own_stops_.phase = Phase::stopping;
+        Status& status = own_stop_.status;
+        const hal::bus::StopRequests::Request request = own_memory_.requests.newest();
+        if (request.count != stop_count_) {
+            stop_count_ = request.count;
+            own_stop_.reason = request.reason;
+            ++status.stops;
+            status.phase = Phase::stopping;
             local_->begin(now);
         }
         local_->work(now);
-        if (own_stops_.phase == Phase::stopping && local_->is_over()) {
-            own_stops_.phase = Phase::stopped;
+        if (status.phase == Phase::stopping && local_->is_over()) {
+            status.phase = Phase::stopped;
         }
-        const bool is_held = own_memory_.stop_held.load(std::memory_order_acquire) != 0;
-        if (own_stops_.phase == Phase::stopped && !is_held) {
-            own_stops_.phase = Phase::watching;
+        if (status.phase == Phase::stopped && !own_memory_.requests.holds_any()) {
+            status.phase = Phase::watching;
         }
-        own_stops_.outcome = local_->outcome();
-        own_memory_.reason.store(own_memory_.stop_reason.load(std::memory_order_relaxed),
-                                 std::memory_order_relaxed);
-        own_memory_.rounds.store(local_->rounds_sent(), std::memory_order_relaxed);
-        own_memory_.elapsed_ns.store(local_->elapsed_ns(), std::memory_order_relaxed);
-        own_memory_.status.store(own_stops_.word(), std::memory_order_release);
+        status.outcome = local_->outcome();
+        status.failure = local_->failure();
+        status.is_ready = local_->is_ready();
+        status.sees_bus = local_->sees_bus();
+        own_stop_.rounds = local_->rounds_sent();
+        own_stop_.elapsed_ns = local_->elapsed_ns();
+        own_stop_.unsent = local_->unsent();
+        own_memory_.record.write(own_stop_);
     }
 
     // --- With a guardian
@@ -197,20 +220,28 @@ private:
         // the values of a guardian are inputs from outside
         const hal::link::OpeningLink link;
         const std::string report = hal::bus::report_file("frames-" + link_.get() + "-" + name_);
-        previous_report_ = hal::bus::take_report(report);
-        guardian_ = std::make_unique<GuardianProcess>();
-        const std::string problem = guardian_->start({.program = program(),
-                                                      .name = name_,
-                                                      .link = link_.get(),
-                                                      .frames = frames_.get(),
-                                                      .confirmations = confirmations_.get(),
-                                                      .schedule = schedule(),
-                                                      .report = report});
+        std::string problem = lock_.acquire(report, link_.get());
+        if (!problem.empty()) throw std::runtime_error(problem);
+        guardian_ = std::make_unique<GuardianProcess>(
+            GuardianArguments{.program = program(),
+                              .name = name_,
+                              .link = link_.get(),
+                              .frames = frames_.get(),
+                              .confirmations = confirmations_.get(),
+                              .schedule = schedule(),
+                              .report = report,
+                              .lock = lock_.descriptor()});
+        problem = guardian_->start();
         if (!problem.empty()) {
             guardian_.reset();
+            lock_.release();
             throw std::runtime_error(problem);
         }
         is_alive_.store(true);
+        stalls_.store(false);
+        was_estop_ = false;
+        turned_ns_ = hal::link::monotonic_ns();
+        previous_report_ = hal::bus::take_report(report);  // now that nothing prevents its print
         if (!previous_report_.empty()) {
             reporter_.tell({Event::previous_stop});
         }
@@ -218,42 +249,95 @@ private:
 
     void end_guardian() noexcept {
         if (!guardian_) return;
-        const std::int64_t limit =
-            unload_ns + repeat_ * every_ms_ * millisecond + 1000 * millisecond;
-        setup_time_.expect(limit, "the guardian still sends the stop frames");
-        const bool was_alive = is_alive_.load();
-        const bool has_ended = guardian_->end(limit);
+        const std::int64_t limit = unload_ns + schedule().duration_ns() + 1000 * millisecond;
+        constexpr std::int64_t start_ns = 3000 * millisecond;
+        setup_time_.expect(2 * limit + start_ns, "the guardian still sends the stop frames");
+        bool has_ended = is_alive_.load() && guardian_->end(limit);
         if (!has_ended) {
-            reporter_.tell({Event::guardian_killed});
-        } else if (was_alive) {
-            report_outcome();
-            report_unsent();
+            if (is_alive_.load()) {
+                reporter_.tell({Event::guardian_killed});
+            }
+            has_ended = replace() && guardian_->end(limit);
         }
+        report_outcome();
+        report_unsent(has_ended);
         guardian_.reset();
+        lock_.release();
     }
 
     /// The guardian has ended by request, and nothing sends what it has not sent.
-    void report_unsent() noexcept {
-        const GuardianMemory& memory = this->memory();
-        const Outcome outcome = Status::of(memory.status.load()).outcome;
-        if (outcome != Outcome::sending && outcome != Outcome::delayed) return;
-        reporter_.tell({.event = Event::not_sent, .rounds = memory.rounds.load()});
+    void report_unsent(bool has_ended) noexcept {
+        const StopRecord stop = memory().record.read();
+        const Outcome outcome = stop.status.outcome;
+        if (has_ended && outcome != Outcome::sending && outcome != Outcome::delayed) return;
+        reporter_.tell({.event = Event::not_sent, .stop = stop});
     }
 
-    /// Of the background thread: sees the end of the guardian, and reports what it does, also while
-    /// no cycle runs.
+    /// Of the background thread: sees the end of the guardian and one that stalls, starts another
+    /// one, and reports what it does, also while no cycle runs.
     void turn(std::int64_t, bool may_wait) noexcept {
-        const std::int64_t pause_ns = may_wait ? 20 * millisecond : 0;
-        if (!guardian_ || !is_alive_.load(std::memory_order_relaxed)) {
+        const std::int64_t pause_ns = may_wait ? turn_ns : 0;
+        if (!guardian_) {
             sleep_for(pause_ns);
+        } else if (!is_alive_.load(std::memory_order_relaxed)) {
+            sleep_for(pause_ns);
+            if (hal::link::monotonic_ns() >= replace_at_ns_) {
+                replace();
+            }
         } else if (guardian_->has_ended_within(pause_ns)) {
             is_alive_.store(false, std::memory_order_release);
             reporter_.tell({Event::guardian_lost});
-            return;
-        } else if (stalls_.load(std::memory_order_relaxed)) {
-            guardian_->resume();
+            replace();
+        } else {
+            watch_turns();
         }
         report_outcome();
+    }
+
+    /// Only time in which this thread runs counts: where it does not, the guardian may stand as
+    /// well.
+    void watch_turns() noexcept {
+        const std::int64_t now = hal::link::monotonic_ns();
+        const std::int64_t elapsed = std::min(now - turned_ns_, 2 * turn_ns);
+        turned_ns_ = now;
+        const std::uint64_t turns = memory().turns.load(std::memory_order_relaxed);
+        silent_ns_ = turns == turns_ ? silent_ns_ + elapsed : 0;
+        turns_ = turns;
+        const bool stalls = silent_ns_ > stall_ns;
+        stalls_.store(stalls, std::memory_order_relaxed);
+        if (stalls) {
+            guardian_->resume();
+        }
+        if (silent_ns_ <= stuck_ns) return;
+        is_alive_.store(false, std::memory_order_release);
+        reporter_.tell({Event::guardian_stuck});
+        replace();
+    }
+
+    /// Starts another guardian. Returns false when that has failed; it is tried again.
+    bool replace() noexcept {
+        std::string problem;
+        try {
+            problem = guardian_->replace();
+        } catch (const std::exception& error) {
+            problem = error.what();
+        }
+        silent_ns_ = 0;
+        turned_ns_ = hal::link::monotonic_ns();
+        stalls_.store(false, std::memory_order_relaxed);
+        if (!problem.empty()) {
+            replace_at_ns_ = turned_ns_ + replace_ns;
+            {
+                const std::lock_guard lock(problem_mutex_);
+                problem_.swap(problem);
+            }
+            reporter_.tell({Event::guardian_missing});
+            return false;
+        }
+        is_alive_.store(true, std::memory_order_release);
+        told_stall_ = false;
+        reporter_.tell({Event::guardian_replaced});
+        return true;
     }
 
     static void sleep_for(std::int64_t ns) noexcept {
@@ -264,15 +348,9 @@ private:
 
     /// Reports what has changed since the last call.
     void report_outcome() noexcept {
-        const GuardianMemory& memory = this->memory();
-        const Status now = Status::of(memory.status.load(std::memory_order_acquire));
-        EventRecord record{.reason = static_cast<StopReason>(memory.reason.load()),
-                           .rounds = memory.rounds.load(),
-                           .elapsed_ns = memory.elapsed_ns.load()};
-        const auto tell = [&](Event event) {
-            record.event = event;
-            reporter_.tell(record);
-        };
+        const StopRecord stop = memory().record.read();
+        const Status& now = stop.status;
+        const auto tell = [&](Event event) { reporter_.tell({.event = event, .stop = stop}); };
         const bool is_new = now.stops != shown_.stops;
         if (is_new) {
             tell(Event::stopping);
@@ -286,11 +364,18 @@ private:
             default: break;
             }
         }
+        if (now.is_ready != shown_.is_ready && !is_stopping(now)) {
+            tell(now.is_ready ? Event::link_ready : Event::link_lost);
+        }
         if (const bool stalls = stalls_.load(std::memory_order_relaxed); stalls != told_stall_) {
             told_stall_ = stalls;
             tell(stalls ? Event::guardian_stalls : Event::guardian_runs);
         }
         shown_ = now;
+    }
+    /// A stop that is tried again reports its link itself.
+    static bool is_stopping(const Status& status) noexcept {
+        return status.phase == Phase::stopping || status.phase == Phase::ended;
     }
 
     std::string line(const EventRecord& record) const {
@@ -299,28 +384,39 @@ private:
                                 [&](std::string_view name) { return value_of(name, record); });
     }
     std::string value_of(std::string_view name, const EventRecord& record) const {
+        const StopRecord& stop = record.stop;
         if (name == "link") return link_.get();
-        if (name == "reason") return reason_texts[static_cast<std::size_t>(record.reason)];
+        if (name == "reason") return to_string(stop.reason);
+        if (name == "sent") return sent_text(stop.status.sees_bus);
         if (name == "report") return previous_report_;
-        char text[48] = "";
-        if (name == "rounds") {
-            std::snprintf(text, sizeof text, "%u time%s", record.rounds,
-                          record.rounds == 1 ? "" : "s");
-        } else if (name == "time") {
-            std::snprintf(text, sizeof text, "%.1f ms",
-                          static_cast<double>(record.elapsed_ns) * 1e-6);
+        if (name == "problem") {
+            const std::lock_guard lock(problem_mutex_);
+            return problem_;
         }
-        return text;
+        std::string text;
+        char number[48] = "";
+        if (name == "unsent" && stop.status.failure == Failure::none) {
+            text = "not as often as declared";
+        } else if (name == "unsent") {
+            append_unsent(text, parsed_, stop.unsent, stop.status.failure);
+        } else if (name == "rounds") {
+            std::snprintf(number, sizeof number, "%u time%s", stop.rounds,
+                          stop.rounds == 1 ? "" : "s");
+        } else if (name == "time") {
+            std::snprintf(number, sizeof number, "%.1f ms",
+                          static_cast<double>(stop.elapsed_ns) * 1e-6);
+        }
+        return text + number;
     }
 
     // --- Of the cycle
 
     void follow_estop(GuardianMemory& memory) noexcept {
         if (estop && !was_estop_) {
-            memory.stop_held.fetch_or(bit_of(StopReason::estop), std::memory_order_release);
-            memory.stop(StopReason::estop);
+            memory.requests.hold(StopReason::estop);
+            memory.requests.request(StopReason::estop);
         } else if (!estop && was_estop_) {
-            memory.stop_held.fetch_and(~bit_of(StopReason::estop), std::memory_order_release);
+            memory.requests.release(StopReason::estop);
         }
         was_estop_ = estop;
     }
@@ -328,40 +424,39 @@ private:
     View look(hal::Cycle cycle) noexcept {
         if (local_) {
             work_local(cycle.start_ns());
-            return {.status = own_stops_};
+            return {.status = own_stop_.status};
         }
         if (!guardian_) return {};
-        watch_turns(cycle);
-        const GuardianMemory& memory = guardian_->memory();
         return {.is_alive = is_alive_.load(std::memory_order_acquire),
                 .stalls = stalls_.load(std::memory_order_relaxed),
-                .status = Status::of(memory.status.load(std::memory_order_acquire))};
+                .status = guardian_->memory().record.status()};
     }
 
-    /// Only time in which cycles run counts: where they do not, the guardian may stand as well.
-    void watch_turns(hal::Cycle cycle) noexcept {
-        const std::int64_t elapsed = std::min(cycle.start_ns() - last_ns_, 2 * cycle.period_ns());
-        last_ns_ = cycle.start_ns();
-        const std::uint64_t turns = guardian_->memory().turns.load(std::memory_order_relaxed);
-        silent_ns_ = turns == turns_ ? silent_ns_ + elapsed : 0;
-        turns_ = turns;
-        stalls_.store(silent_ns_ > stall_ns, std::memory_order_relaxed);
+    /// The outcome of a stop lasts until the next one, or until it is acknowledged.
+    Outcome lasting_outcome(const Status& status) noexcept {
+        if (acknowledge && !was_acknowledged_ && status.phase != Phase::stopping) {
+            acknowledged_stop_ = status.stops;
+        }
+        was_acknowledged_ = acknowledge;
+        return status.stops == acknowledged_stop_ ? Outcome::none : status.outcome;
     }
 
     void show(const View& view) noexcept {
+        const Status& status = view.status;
         set(guardian_fault_, Event::guardian_lost, !view.is_alive);
         set(stall_fault_, Event::guardian_stalls, view.is_alive && view.stalls);
-        const bool stops_now =
-            view.status.phase == Phase::stopping || view.status.phase == Phase::stopped;
-        const Outcome outcome = stops_now ? view.status.outcome : Outcome::none;
+        const Outcome outcome = lasting_outcome(status);
         set(outcome_fault_, Event::unconfirmed, outcome == Outcome::unconfirmed);
-        set(link_fault_, Event::delayed, outcome == Outcome::delayed);
-        const bool is_sent = outcome == Outcome::sent || outcome == Outcome::confirmed;
-        guarded = has_guardian_ && view.is_alive && !view.stalls;
-        stopped = view.status.phase == Phase::stopped && is_sent;
+        set(delay_fault_, Event::delayed, outcome == Outcome::delayed);
+        set(link_fault_, Event::link_lost,
+            !status.is_ready && outcome != Outcome::delayed && !is_stopping(status));
+        const bool is_sent =
+            status.outcome == Outcome::sent || status.outcome == Outcome::confirmed;
+        guarded = has_guardian_ && view.is_alive && !view.stalls && status.is_ready;
+        stopped = status.phase == Phase::stopped && is_sent;
         fault = guardian_fault_.lasts() || stall_fault_.lasts() || outcome_fault_.lasts() ||
-                link_fault_.lasts();
-        stops = view.status.stops;
+                delay_fault_.lasts() || link_fault_.lasts();
+        stops = status.stops;
     }
 
     void set(hal::LastingFault& condition, Event event, bool lasts) noexcept {
@@ -408,16 +503,23 @@ private:
                           {.required = true}};
     hal::Emergency emergency_{*this, &FrameGuardian::make_safe, "sends the stop frames"};
 
-    hal::In<bool> estop{*this, "estop", "TRUE: the stop frames are sent"};
-    hal::Out<bool> guarded{*this, "guarded",
+    hal::In<bool> estop{*this, "estop",
+                        "rising edge: the stop frames are sent; the reason lasts while it is TRUE"};
+    hal::In<bool> acknowledge{*this, "acknowledge",
+                              "rising edge: the fault of the last stop is over"};
+    hal::Out<bool> guarded{*this,
+                           "guarded",
                            "a guardian sends the stop frames when this process ends; FALSE on a "
-                           "bus in memory"};
-    hal::Out<bool> stopped{*this, "stopped",
+                           "bus in memory, and while update does not run",
+                           {.safe = false}};
+    hal::Out<bool> stopped{*this,
+                           "stopped",
                            "the stop frames have been sent, and confirmed if that is asked for; "
-                           "the reason lasts"};
+                           "the reason lasts; FALSE while update does not run",
+                           {.safe = false}};
     hal::Out<bool> fault{*this, "fault",
-                         "the guardian is lost or stalls, or the stop frames are not sent or not "
-                         "confirmed"};
+                         "the guardian is lost or stalls, the link is down, or the stop frames are "
+                         "not sent or not confirmed, until the next stop or `acknowledge`"};
     hal::Out<std::uint32_t> stops{*this, "stops", "stops begun, modulo 65536"};
 
     const std::string name_;
@@ -428,29 +530,36 @@ private:
     hal::SetupTime setup_time_;
     std::string previous_report_;
 
+    hal::bus::ReportLock lock_;
     std::unique_ptr<GuardianProcess> guardian_;
     std::atomic<bool> is_alive_{true};  // written by the background thread
-    std::atomic<bool> stalls_{false};  // written by the cycle
+    std::atomic<bool> stalls_{false};  // written by the background thread
     std::atomic<bool> is_interrupted_{false};  // written by the emergency function
+    std::atomic<std::uint64_t> safe_cycle_{0};  // in which that was called; 0: update has run since
 
     std::unique_ptr<StopTransmitter> local_;
     std::int64_t local_ns_ = 0;  // when it has worked last
     GuardianMemory own_memory_;
-    Status own_stops_;
+    StopRecord own_stop_;
     std::uint32_t stop_count_ = 0;
 
     const hal_faults* faults_ = nullptr;
-    hal::LastingFault guardian_fault_, stall_fault_, outcome_fault_, link_fault_;
+    hal::LastingFault guardian_fault_, stall_fault_, outcome_fault_, delay_fault_, link_fault_;
     hal::bus::FaultTexts fault_texts_{event_rows, 1,
                                       [this](Event event, std::size_t, std::string_view name) {
-        return value_of(name, {.event = event});
+        return value_of(name, {.event = event, .stop = {}});
     }};
     bool was_estop_ = false;
-    std::uint64_t turns_ = 0;
-    std::int64_t silent_ns_ = 0;
-    std::int64_t last_ns_ = 0;
+    bool was_acknowledged_ = false;
+    std::uint32_t acknowledged_stop_ = 0;  // Status::stops
 
     // of the background thread
+    std::uint64_t turns_ = 0;
+    std::int64_t silent_ns_ = 0;
+    std::int64_t turned_ns_ = 0;
+    std::int64_t replace_at_ns_ = 0;
+    mutable std::mutex problem_mutex_;  // this thread and that of the reporter
+    std::string problem_;
     Status shown_;
     bool told_stall_ = false;
     hal::Reporter<EventRecord> reporter_{
@@ -475,9 +584,14 @@ heartbeat, state stopped. A real bus is `link=can:can0`. The frames are sent `re
 `every_ms=` apart; with `confirm=` until each of its frames has been received, and at most `repeat=`
 times.
 
-A CAN frame counts as sent when another node has acknowledged it (`can:`, `sim:`). On `eth:` and the
-other drivers it counts when the driver has taken it. Ethernet frames are written whole, without
-check sequence: `send=01005E000001.020000000001.88B5.0000`.
+A CAN frame counts as sent when its echo shows that another node has acknowledged it (`sim:`, and
+`can:` with a controller that returns what it has sent). On `eth:` and the other drivers it is handed
+to the driver, and the messages state that. A frame that the link does not accept or acknowledge is
+sent again until it does. Ethernet frames are written whole, without check sequence:
+`send=01005E000001.020000000001.88B5.0000`.
+
+The fault of a stop that was not sent or not confirmed lasts until the next stop, or a rising edge of
+`acknowledge`. A guardian that has ended or stalls is a fault as well, and another one takes over.
 
 The component and other users share the interface; only their frames are mixed with these. A serial
 adapter (`slcan:`) has one user at a time. On `sim:` there is no guardian: the component sends the
