@@ -128,6 +128,17 @@ TEST(Pin, Functions_have_the_names_of_their_modules) {
     EXPECT_EQ(function_of(PinDescriptor::decode(0x03000000)), "");
 }
 
+TEST(Registers, Control_of_encoders_has_its_bits_where_the_register_map_says) {
+    EXPECT_EQ(encoder::index_polarity, 0x0008U);
+    EXPECT_EQ(encoder::latch_on_index, 0x0010U);
+    EXPECT_EQ(encoder::just_once, 0x0040U);
+    EXPECT_EQ(encoder::mask_polarity, 0x0100U);
+    EXPECT_EQ(encoder::use_mask, 0x0200U);
+    EXPECT_EQ(encoder::filter_15, 0x0800U);
+    EXPECT_EQ(encoder::probe_polarity, 0x1000U);
+    EXPECT_EQ(encoder::latch_on_probe, 0x2000U);
+}
+
 TEST(Formulas, Give_the_values_seen_on_the_wire) {
     EXPECT_EQ(step_rate(1000.0, low), 0xa7c5);
     EXPECT_NEAR(steps_per_s(1, low), 0.0233, 0.0001);
