@@ -3,7 +3,9 @@
 // NAME].
 #include "card_config.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "bus/config/key_table.hpp"
 #include "bus/config/section_file.hpp"
@@ -30,18 +32,17 @@ constexpr bus::SectionKind section_kinds[] = {{"card", "[card]", bus::SectionUse
                                               {"output", "[output NAME]", bus::SectionUse::named}};
 
 constexpr const char* terminal_form =
-    "gpio 17, inm 3, ssr 0, outm 4, or remote CHANNEL NUMBER as in remote 0 5";
+    "gpio 17, inm 3, inmux 3, ssr 0, outm 4, or remote CHANNEL NUMBER as in remote 0 5";
 
 struct TerminalWord {
     const char* word;
     Terminal::Kind kind;
     unsigned max;
 };
-constexpr TerminalWord terminal_words[] = {{"gpio", Terminal::Kind::gpio, max_pins},
-                                           {"inm", Terminal::Kind::inm, 31},
-                                           {"ssr", Terminal::Kind::ssr, 30},
-                                           {"outm", Terminal::Kind::outm, 31},
-                                           {"remote", Terminal::Kind::remote, 31}};
+constexpr TerminalWord terminal_words[] = {
+    {"gpio", Terminal::Kind::gpio, max_pins}, {"inm", Terminal::Kind::inm, 31},
+    {"inmux", Terminal::Kind::inmux, 31},     {"ssr", Terminal::Kind::ssr, 30},
+    {"outm", Terminal::Kind::outm, 31},       {"remote", Terminal::Kind::remote, 31}};
 
 bool parse_terminal(Terminal& to, const Entry& entry) {
     const auto words = text::words_of(entry.value);
@@ -88,6 +89,21 @@ bool parse_type(CardConfig& card, const Entry& entry) {
     card.model = find_card_model(lower(entry.value.text));
     return card.model != nullptr;
 }
+/// A version of the list, decimal or hexadecimal.
+bool parse_version(std::optional<std::uint8_t>& to, const Entry& entry,
+                   std::span<const std::uint8_t> versions) {
+    const auto number = parse_natural(entry.value.text);
+    if (!number || std::ranges::find(versions, *number) == versions.end()) return false;
+    to = static_cast<std::uint8_t>(*number);
+    return true;
+}
+bool parse_stepgen_version(CardConfig& card, const Entry& entry) {
+    return parse_version(card.stepgen_version, entry, kind_of(Tag::stepgen)->versions);
+}
+bool parse_encoder_version(CardConfig& card, const Entry& entry) {
+    return parse_version(card.encoder_version, entry, kind_of(Tag::encoder)->versions) ||
+           parse_version(card.encoder_version, entry, kind_of(Tag::muxed_encoder)->versions);
+}
 bool parse_remotes(CardConfig& card, const Entry& entry) {
     card.remotes = 0;
     if (same_word(entry.value.text, "none")) return true;
@@ -101,14 +117,14 @@ bool parse_remotes(CardConfig& card, const Entry& entry) {
 
 const bus::KeyTable<CardConfig>& card_keys() {
     static const bus::KeyTable<CardConfig> table{{
-        {"type", bus::own("7i92, 7i76e or 7i96s", "7i92, 7i76e, 7i96s", parse_type), "",
+        {"type", bus::own("7i92, 7i76e, 7i95 or 7i96s", "7i92, 7i76e, 7i95, 7i96s", parse_type), "",
          "The card."},
         {"address", bus::text_value(&CardConfig::address, "ADDRESS"), "",
          "`sim:NAME` for the component; for `hal node mesa` the IP address of this computer on "
          "which the card answers, as in `127.0.0.1` or `10.10.10.10:27181`."},
         {"remotes",
          bus::own("channels 0..7 as in 0, 2, or none", "channels 0..7, or none", parse_remotes),
-         "`0`; of a 7i96s `none`", "The smart-serial channels that have a 7I76."},
+         "`0`; of a 7i95 or 7i96s `none`", "The smart-serial channels that have a 7I76."},
         {"name", bus::text_value(&CardConfig::reported, "NAME"), "that of the card",
          "The name that the card reports."},
         {"lbp-version", bus::number(&CardConfig::lbp_version, 2, 9), "`3`",
@@ -119,6 +135,18 @@ const bus::KeyTable<CardConfig>& card_keys() {
          "The step generators of another firmware: fewer."},
         {"encoders", bus::number(&CardConfig::encoders, 0, 10), "all", "The same for encoders."},
         {"pwmgens", bus::number(&CardConfig::pwmgens, 0, 10), "all", "The same for PWM."},
+        {"3pwmgens", bus::number(&CardConfig::three_phase_pwms, 0, 2), "`0`",
+         "The three-phase PWM generators of another firmware, of a 7i76e."},
+        {"pktuarts", bus::number(&CardConfig::packet_uarts, 0, 1), "`0`",
+         "The packet UARTs of another firmware, of a 7i76e: descriptors without a function."},
+        {"stepgen-version",
+         bus::own("0, 1, 2, 0x42 or 0xC2", "0, 1, 2, 0x42, 0xC2", parse_stepgen_version), "`2`",
+         "The version of the step generators: from 0x42 step and direction can be exchanged, and "
+         "0xC2 has index and probe."},
+        {"encoder-version",
+         bus::own("2, 3, 4, 0x83 or 0x84", "2, 3, 4, 0x83, 0x84", parse_encoder_version),
+         "`2`; of a 7i95 `4`",
+         "The version of the encoders: 0x83, and of a 7i95 0x84, has a probe."},
     }};
     return table;
 }
@@ -145,7 +173,7 @@ const bus::KeyTable<MotorConfig>& motor_keys() {
 const bus::KeyTable<SwitchConfig>& switch_keys() {
     static const bus::KeyTable<SwitchConfig> table{{
         {"terminal",
-         bus::own(terminal_form, "`gpio N`, `inm N`, `remote CHANNEL N`",
+         bus::own(terminal_form, "`gpio N`, `inm N`, `inmux N`, `remote CHANNEL N`",
                   [](SwitchConfig& to, const Entry& entry) {
         return parse_terminal(to.terminal, entry);
     }),
@@ -189,7 +217,7 @@ const bus::KeyTable<WireConfig>& wire_keys() {
     static const bus::KeyTable<WireConfig> table{{
         {"terminal",
          bus::own(
-             terminal_form, "`gpio N`, `inm N`, `ssr N`, `outm N`, `remote CHANNEL N`",
+             terminal_form, "`gpio N`, `inm N`, `inmux N`, `ssr N`, `outm N`, `remote CHANNEL N`",
              [](WireConfig& to, const Entry& entry) { return parse_terminal(to.terminal, entry); }),
          "", "The input or output that it is connected to."},
         {"initial", bus::flag(&WireConfig::initial), "`no`",
@@ -244,7 +272,7 @@ private:
         keys.report_rest("in [card]", card_keys().names());
         if (!has_type) {
             report_.error(Topic::line, section.at, "[card] has no type",
-                          "write type = 7i92, 7i76e or 7i96s");
+                          "write type = 7i92, 7i76e, 7i95 or 7i96s");
         }
         if (!has_remotes && card.model != nullptr) {
             card.remotes = card.model->default_remotes;
@@ -270,6 +298,7 @@ private:
 
     void check() {
         check_names();
+        check_versions();
         for (const MotorConfig& motor : out_.card.motors) {
             check_unit(motor.at, Tag::stepgen, motor.stepgen);
             check_encoder(motor.at, motor.encoder);
@@ -340,7 +369,7 @@ private:
     }
     void check_encoder(const Span& at, const std::optional<unsigned>& encoder) {
         if (encoder) {
-            check_unit(at, Tag::encoder, *encoder);
+            check_unit(at, out_.card.encoder_tag(), *encoder);
         }
     }
     void check_channel(const Span& at, unsigned channel) {
@@ -387,6 +416,7 @@ private:
             }
             return;
         case Kind::inm: check_module(at, Tag::inm, is_input); return;
+        case Kind::inmux: check_module(at, Tag::inmux, is_input); return;
         case Kind::ssr: check_module(at, Tag::ssr, !is_input); return;
         case Kind::outm: check_module(at, Tag::outm, !is_input); return;
         }
@@ -394,12 +424,37 @@ private:
     void check_module(const Span& at, Tag tag, bool right_direction) {
         const std::string name(name_of(tag));
         if (out_.card.instances(tag) == 0) {
-            error(at, "this card has no module " + name, "of these cards a 7i96s has it");
+            error(at, "this card has no module " + name, cards_with(tag));
         } else if (!right_direction) {
+            const bool is_input = tag == Tag::inm || tag == Tag::inmux;
             error(at, name + " is of the other direction",
-                  tag == Tag::inm ? "an output is ssr, outm, gpio or remote"
-                                  : "an input is inm, gpio or remote");
+                  is_input ? "an output is ssr, outm, gpio or remote"
+                           : "an input is inm, inmux, gpio or remote");
         }
+    }
+
+    /// Names the cards that have a module.
+    static std::string cards_with(Tag tag) {
+        std::string types;
+        for (const CardModel& model : card_models()) {
+            const bool has = std::ranges::find(model.modules, tag, &ModuleDescriptor::tag) !=
+                             model.modules.end();
+            if (!has) continue;
+            types += types.empty() ? "" : " and ";
+            types += model.type;
+        }
+        return "cards with it: " + types;
+    }
+    void check_versions() {
+        CardConfig& card = out_.card;
+        const Tag tag = card.encoder_tag();
+        if (!card.encoder_version || card.instances(tag) == 0) return;
+        const ModuleKind& kind = *kind_of(tag);
+        if (std::ranges::find(kind.versions, *card.encoder_version) != kind.versions.end()) return;
+        const bool is_muxed = tag == Tag::muxed_encoder;
+        error(card.at, "this card has no encoders of this version",
+              is_muxed ? "write encoder-version = 2, 3, 4 or 0x84"
+                       : "write encoder-version = 2, 3 or 0x83");
     }
 
     void check_sharing() {
@@ -447,12 +502,29 @@ unsigned CardConfig::instances(Tag tag) const {
         const unsigned all = module.instances;
         switch (tag) {
         case Tag::stepgen: return std::min(all, stepgens.value_or(all));
-        case Tag::encoder: return std::min(all, encoders.value_or(all));
+        case Tag::encoder:
+        case Tag::muxed_encoder: return std::min(all, encoders.value_or(all));
         case Tag::pwm: return std::min(all, pwmgens.value_or(all));
+        case Tag::three_phase_pwm: return std::min(all, three_phase_pwms.value_or(0));
+        case Tag::packet_uart_transmit:
+        case Tag::packet_uart_receive: return std::min(all, packet_uarts.value_or(0));
         default: return all;
         }
     }
     return 0;
+}
+
+Tag CardConfig::encoder_tag() const {
+    return instances(Tag::muxed_encoder) > 0 ? Tag::muxed_encoder : Tag::encoder;
+}
+
+std::uint8_t CardConfig::version_of(const ModuleDescriptor& module) const {
+    switch (module.tag) {
+    case Tag::stepgen: return stepgen_version.value_or(module.version);
+    case Tag::encoder:
+    case Tag::muxed_encoder: return encoder_version.value_or(module.version);
+    default: return module.version;
+    }
 }
 
 CardReadResult read_card(std::string_view text, const std::string& file) {

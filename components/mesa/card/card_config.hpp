@@ -24,7 +24,7 @@ const char* code_of(Topic);
 
 /// A terminal of the card or of a device on its smart-serial port.
 struct Terminal {
-    enum class Kind : std::uint8_t { none, gpio, inm, ssr, outm, remote };
+    enum class Kind : std::uint8_t { none, gpio, inm, inmux, ssr, outm, remote };
     Kind kind = Kind::none;
     std::uint8_t channel = 0;  ///< remote
     std::uint8_t number = 0;
@@ -84,6 +84,8 @@ struct CardConfig {
     std::uint32_t idrom_type = 0;    ///< 0: that of the model
     std::uint16_t lbp_version = 3;
     std::optional<unsigned> stepgens, encoders, pwmgens;  ///< of another firmware: fewer
+    std::optional<unsigned> three_phase_pwms, packet_uarts;  ///< the same: more than none
+    std::optional<std::uint8_t> stepgen_version, encoder_version;
     std::uint8_t remotes = 0;        ///< bit n: a 7I76 on channel n
     std::vector<MotorConfig> motors;
     std::vector<SwitchConfig> switches;
@@ -93,6 +95,10 @@ struct CardConfig {
 
     /// The instances of a module; 0: the card has none.
     unsigned instances(Tag tag) const;
+    /// The kind of its encoders.
+    Tag encoder_tag() const;
+    /// The version of a module of the firmware.
+    std::uint8_t version_of(const ModuleDescriptor& module) const;
 };
 
 struct CardReadResult {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// 7I92: firmware 7i76x2 (pins of PIN_7I76x2_34). 7I76E: PIN_7I76E_51. 7I96S: the modules of
-// 7i96s_d; which pins of its second and third port they have is not published, so that part is
-// ours.
+// 7I92: firmware 7i76x2 (pins of PIN_7I76x2_34). 7I76E: PIN_7I76E_51; its free pins have the modules
+// of other firmware. 7I96S: the modules of 7i96s_d; which pins of its second and third port they have
+// is not published, so that part is ours, and so are the pins of the 7I95.
 #include "card_model.hpp"
 
 #include <algorithm>
@@ -23,6 +23,17 @@ constexpr ModuleDescriptor stepgen_module(std::uint8_t count) {
 constexpr ModuleDescriptor encoder_module(std::uint8_t count) {
     return {Tag::encoder, 2, ClockTag::low, count, 0x3000, 5, 0, 0x3};
 }
+constexpr ModuleDescriptor muxed_encoder_module(std::uint8_t count) {
+    return {Tag::muxed_encoder, 4, ClockTag::low, count, 0x3500, 5, 0, 0x3};
+}
+constexpr ModuleDescriptor three_phase_module(std::uint8_t count) {
+    return {Tag::three_phase_pwm, 0, ClockTag::high, count, 0x4500, 4, 0, 0x3};
+}
+constexpr ModuleDescriptor packet_transmit_module{
+    Tag::packet_uart_transmit, 2, ClockTag::low, 1, 0x6100, 4, 0, 0xf};
+constexpr ModuleDescriptor packet_receive_module{
+    Tag::packet_uart_receive, 2, ClockTag::low, 1, 0x6500, 4, 0, 0xf};
+constexpr ModuleDescriptor inmux_module{Tag::inmux, 0, ClockTag::low, 1, 0x8000, 5, 0, 0x1f};
 constexpr ModuleDescriptor serial_module{
     Tag::smart_serial, 0, ClockTag::low, 1, 0x5b00, 6, 0x10, 0x3c};
 constexpr ModuleDescriptor dpll_module{Tag::dpll, 0, ClockTag::low, 1, 0x7000, 7, 0, 0};
@@ -34,9 +45,13 @@ constexpr ModuleDescriptor outm_module{Tag::outm, 0, ClockTag::low, 1, 0xb000, 1
 
 constexpr ModuleDescriptor modules_7i92[] = {watchdog_module, ports_module(2),    encoder_module(2),
                                              serial_module,   stepgen_module(10), led_module};
-constexpr ModuleDescriptor modules_7i76e[] = {dpll_module,       watchdog_module, ports_module(3),
-                                              encoder_module(1), serial_module,   stepgen_module(5),
-                                              led_module};
+constexpr ModuleDescriptor modules_7i76e[] = {
+    dpll_module,           watchdog_module,   ports_module(3),       encoder_module(1),
+    serial_module,         stepgen_module(5), three_phase_module(2), packet_transmit_module,
+    packet_receive_module, led_module};
+constexpr ModuleDescriptor modules_7i95[] = {
+    dpll_module,   watchdog_module,   ports_module(2),         inmux_module, ssr_module,
+    serial_module, stepgen_module(6), muxed_encoder_module(6), led_module};
 constexpr ModuleDescriptor modules_7i96s[] = {
     dpll_module,   watchdog_module,   ports_module(3), inm_module, ssr_module,       outm_module,
     serial_module, stepgen_module(5), pwm_module,      led_module, encoder_module(1)};
@@ -77,6 +92,21 @@ constexpr void put_7i76_rest(std::span<std::uint32_t> pins, std::size_t at, unsi
     pins[at + 6] = pin(Tag::encoder, counter, pin_number::encoder::a, false);
 }
 
+/// Index and probe of `count` step generators from pin `at`, of firmware that has them.
+constexpr void put_latch_inputs(std::span<std::uint32_t> pins, std::size_t at, unsigned count) {
+    for (unsigned n = 0; n < count; ++n) {
+        pins[at + 2 * n] = pin(Tag::stepgen, n, pin_number::stepgen::index, false);
+        pins[at + 2 * n + 1] = pin(Tag::stepgen, n, pin_number::stepgen::probe, false);
+    }
+}
+
+constexpr void put_three_phases(std::span<std::uint32_t> pins, std::size_t at, unsigned unit) {
+    for (unsigned number = 1; number < pin_number::three_phase_pwm::fault; ++number) {
+        pins[at + number - 1] = pin(Tag::three_phase_pwm, unit, number, true);
+    }
+    pins[at + 7] = pin(Tag::three_phase_pwm, unit, pin_number::three_phase_pwm::fault, false);
+}
+
 constexpr auto pins_7i92 = [] {
     std::array<std::uint32_t, 34> pins{};
     for (unsigned connector = 0; connector < 2; ++connector) {
@@ -91,6 +121,43 @@ constexpr auto pins_7i76e = [] {
     pins.fill(free_pin);
     put_step_generators(pins, 0, 0, 5, false);
     put_7i76_rest(pins, 10, 0, 0);
+    put_latch_inputs(pins, 17, 5);
+    pins[27] = pin(Tag::packet_uart_transmit, 0, 1, true);
+    pins[28] = pin(Tag::packet_uart_transmit, 0, 3, true);
+    pins[29] = pin(Tag::packet_uart_receive, 0, 1, false);
+    pins[33] = pin(Tag::encoder, 0, pin_number::encoder::probe, false);
+    put_three_phases(pins, 35, 0);
+    put_three_phases(pins, 43, 1);
+    return pins;
+}();
+
+constexpr auto pins_7i95 = [] {
+    std::array<std::uint32_t, 58> pins{};
+    pins.fill(free_pin);
+    put_step_generators(pins, 0, 0, 6, true);
+    for (unsigned pair = 0; pair < 3; ++pair) {
+        using namespace pin_number::encoder;
+        pins[12 + 3 * pair] = pin(Tag::muxed_encoder, pair, a, false);
+        pins[13 + 3 * pair] = pin(Tag::muxed_encoder, pair, b, false);
+        pins[14 + 3 * pair] = pin(Tag::muxed_encoder, pair, index, false);
+    }
+    pins[21] = pin(Tag::mux_select, PinDescriptor::all_units, 1, true);
+    for (unsigned n = 0; n < 5; ++n) {
+        pins[22 + n] = pin(Tag::inmux, 0, pin_number::inmux::first_address + n, true);
+    }
+    pins[27] = pin(Tag::inmux, 0, pin_number::inmux::data, false);
+    for (unsigned n = 0; n < 6; ++n) {
+        pins[28 + n] = pin(Tag::ssr, 0, n + 1, true);
+    }
+    pins[34] = pin(Tag::ssr, 0, pin_number::ssr::reference, true);
+    for (unsigned channel = 0; channel < 2; ++channel) {
+        using namespace pin_number::smart_serial;
+        pins[35 + 3 * channel] = pin(Tag::smart_serial, 0, first_receive + channel, false);
+        pins[36 + 3 * channel] = pin(Tag::smart_serial, 0, first_transmit + channel, true);
+        pins[37 + 3 * channel] = pin(Tag::smart_serial, 0, first_enable + channel, true);
+    }
+    put_latch_inputs(pins, 41, 6);
+    pins[53] = pin(Tag::muxed_encoder, PinDescriptor::all_units, pin_number::encoder::probe, false);
     return pins;
 }();
 
@@ -121,6 +188,7 @@ constexpr auto pins_7i96s = [] {
 constexpr CardModel models[] = {
     {"7i92", "7I92", "MESA7I92", 2, 2, 17, modules_7i92, pins_7i92, 0x1},
     {"7i76e", "7I76E-16", "MESA7I76", 2, 3, 17, modules_7i76e, pins_7i76e, 0x1},
+    {"7i95", "7I95", "MESA7I95", 2, 2, 29, modules_7i95, pins_7i95, 0x0},
     {"7i96s", "7I96S", "MESA7I96", 3, 3, 17, modules_7i96s, pins_7i96s, 0x0},
 };
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "mesa/hostmot2/formulas.hpp"
 #include "mesa/hostmot2/pin.hpp"
@@ -30,13 +31,23 @@ void put_text(std::array<std::uint8_t, N>& space, std::size_t at, std::string_vi
 /// The registers behind those of the descriptor that select a timer of the DPLL.
 unsigned registers_of(const ModuleDescriptor& module) {
     if (module.tag == Tag::stepgen) return stepgen::dpll_timer + 1;
-    if (module.tag == Tag::encoder) return encoder::dpll_timer + 1;
+    const bool is_encoder = module.tag == Tag::encoder || module.tag == Tag::muxed_encoder;
+    if (is_encoder) return encoder::dpll_timer + 1;
     return module.registers;
 }
 
 /// The timer that a register selects, 1..4; 0: off.
 unsigned timer_of(std::uint32_t selection) noexcept {
     return (selection & 0x8000U) != 0 ? selection >> 12 & 7U : 0;
+}
+
+/// The accumulator of a generator at a step, `remaining` steps before its newest one.
+std::uint32_t accumulator_at(const StepGenerator& dds, std::int64_t steps,
+                             std::int64_t remaining) noexcept {
+    const std::uint32_t newest =
+        steps > 0 ? dds.accumulator() & 0xffff0000U : dds.accumulator() | 0xffffU;
+    const std::int64_t back = steps > 0 ? -remaining : remaining;
+    return newest + static_cast<std::uint32_t>(back * 65536);
 }
 
 constexpr std::uint32_t bit(std::uint32_t word, unsigned n) noexcept { return word >> n & 1U; }
@@ -60,6 +71,7 @@ EmulatedCard::EmulatedCard(const CardConfig& config, const std::array<std::uint8
     for (ModuleDescriptor descriptor : model_.modules) {
         descriptor.instances = static_cast<std::uint8_t>(config.instances(descriptor.tag));
         if (descriptor.instances == 0) continue;
+        descriptor.version = config.version_of(descriptor);
         modules_.push_back({descriptor, {descriptor, idrom_}, registers_of(descriptor)});
     }
     for (unsigned channel = 0; channel < smart_serial::max_channels; ++channel) {
@@ -100,10 +112,33 @@ void EmulatedCard::fill_rom() {
 /// The descriptor of a pin: that of the model, unless its module is missing in this firmware.
 PinDescriptor EmulatedCard::descriptor(std::size_t pin) const noexcept {
     const PinDescriptor whole = PinDescriptor::decode(model_.descriptors[pin]);
-    const bool is_counted =
-        whole.module == Tag::stepgen || whole.module == Tag::encoder || whole.module == Tag::pwm;
-    if (is_counted && whole.unit >= config_.instances(whole.module)) return PinDescriptor{};
-    return whole;
+    return has_pin(whole) ? whole : PinDescriptor{};
+}
+
+/// Whether this firmware has a pin of the model.
+bool EmulatedCard::has_pin(const PinDescriptor& pin) const noexcept {
+    const std::uint8_t encoder_version = config_.encoder_version.value_or(0);
+    const unsigned count = config_.instances(pin.module);
+    switch (pin.module) {
+    case Tag::stepgen: {
+        const bool is_latch_input = pin.number >= pin_number::stepgen::index;
+        const bool can_latch = config_.stepgen_version.value_or(0) == stepgen::version_with_latch;
+        return pin.unit < count && (can_latch || !is_latch_input);
+    }
+    case Tag::encoder:
+    case Tag::muxed_encoder: {
+        const bool is_probe = pin.number == pin_number::encoder::probe;
+        if (is_probe && (encoder_version & encoder::version_with_probe) == 0) return false;
+        if (pin.unit == PinDescriptor::all_units) return count > 0;
+        return pin.unit < (pin.module == Tag::encoder ? count : (count + 1) / 2);
+    }
+    case Tag::mux_select: return config_.instances(Tag::muxed_encoder) > 0;
+    case Tag::pwm:
+    case Tag::three_phase_pwm:
+    case Tag::packet_uart_transmit:
+    case Tag::packet_uart_receive: return pin.unit < count;
+    default: return true;
+    }
 }
 
 /// Whether a smart-serial channel has a pin to send.
@@ -120,6 +155,31 @@ std::size_t EmulatedCard::find_output(Tag tag, unsigned unit, unsigned number) c
     return no_pin;
 }
 
+std::size_t EmulatedCard::find_input(Tag tag, unsigned unit, unsigned number) const noexcept {
+    for (std::size_t pin = 0; pin < outside_.size(); ++pin) {
+        const PinDescriptor is = descriptor(pin);
+        const bool is_of_unit = is.unit == unit || is.unit == PinDescriptor::all_units;
+        if (is.module == tag && is_of_unit && is.number == number && !is.is_output) return pin;
+    }
+    return no_pin;
+}
+
+/// The probe is an input of the card, on which a switch of the same motor may be.
+void EmulatedCard::find_latch_inputs(unsigned unit) {
+    Generator& generator = generators_[unit];
+    generator.latch.set_version(config_.stepgen_version.value_or(0));
+    generator.index.pin = find_input(Tag::stepgen, unit, pin_number::stepgen::index);
+    generator.probe.pin = find_input(Tag::stepgen, unit, pin_number::stepgen::probe);
+    for (std::size_t n = 0; n < config_.switches.size(); ++n) {
+        const SwitchConfig& one = config_.switches[n];
+        const bool is_there =
+            one.terminal.kind == Terminal::Kind::gpio && one.terminal.number == generator.probe.pin;
+        if (is_there && config_.motors[one.motor_index].stepgen == unit) {
+            generator.probe.switch_index = n;
+        }
+    }
+}
+
 void EmulatedCard::find_pins() {
     unsigned channels = 0;
     while (channels < smart_serial::max_channels && has_channel(channels)) {
@@ -130,9 +190,14 @@ void EmulatedCard::find_pins() {
         Generator& generator = generators_[unit];
         generator.step_pin = find_output(Tag::stepgen, unit, pin_number::stepgen::step);
         generator.direction_pin = find_output(Tag::stepgen, unit, pin_number::stepgen::direction);
+        find_latch_inputs(unit);
     }
     for (unsigned unit = 0; unit < max_units; ++unit) {
         pwm_pins_[unit] = find_output(Tag::pwm, unit, pin_number::pwm::out);
+        fault_pins_[unit] =
+            find_input(Tag::three_phase_pwm, unit, pin_number::three_phase_pwm::fault);
+        counters_[unit].probe_pin =
+            find_input(config_.encoder_tag(), unit, pin_number::encoder::probe);
     }
 }
 
@@ -140,10 +205,15 @@ void EmulatedCard::reset() noexcept {
     ports_ = {};
     for (Generator& generator : generators_) {
         generator.dds = {};
-        generator.mode = 0;
+        generator.latch.reset();
         generator.latched = 0;
     }
-    counters_ = {};
+    for (Counter& counter : counters_) {
+        counter.counter = {};
+        counter.latched = 0;
+    }
+    bridges_ = {};
+    bridge_rate_ = 0;
     watchdog_ = {};
     phase_loop_ = PhaseLoop(clock_hz_);
     serial_.reset();
@@ -160,7 +230,7 @@ void EmulatedCard::reset() noexcept {
     ssr_rate_ = 0;
     outm_data_ = 0;
     leds_ = 0;
-    inm_control_ = 10;  // eleven inputs
+    inm_control_ = config_.instances(Tag::inmux) > 0 ? 23 : 10;  // inputs of the card, less 1
     inm_filter_ = 0;
     timers_ = {};
     status_ = {};
@@ -209,17 +279,90 @@ void EmulatedCard::run(std::int64_t clocks) noexcept {
     }
 }
 
+/// With exchanged pins neither is what its motor expects.
+bool EmulatedCard::drives_motor(const Generator& generator) const noexcept {
+    return is_driven_by_module(generator.step_pin) &&
+           is_driven_by_module(generator.direction_pin) && !generator.latch.swaps_pins();
+}
+
 void EmulatedCard::move_motors(std::int64_t clocks) noexcept {
     for (unsigned unit = 0; unit < config_.instances(Tag::stepgen); ++unit) {
+        const std::int64_t steps = generators_[unit].dds.advance(clocks);
+        if (steps != 0 && drives_motor(generators_[unit])) {
+            step_motor(unit, steps);
+        }
+    }
+    sample_latch_inputs();
+}
+
+void EmulatedCard::step_motor(unsigned unit, std::int64_t steps) noexcept {
+    Generator& generator = generators_[unit];
+    const std::size_t pin = generator.direction_pin;
+    const bool is_inverted =
+        bit(ports_[pin / model_.pins].invert, static_cast<unsigned>(pin % model_.pins)) != 0;
+    const auto indexed = plant_.indexed_motor(unit);
+    std::optional<std::size_t> probed;
+    if (generator.probe.switch_index) {
+        probed = config_.switches[*generator.probe.switch_index].motor_index;
+    }
+    const std::int64_t index_from = indexed ? plant_.steps(*indexed) : 0;
+    const std::int64_t probe_from = probed ? plant_.steps(*probed) : 0;
+    plant_.step(unit, is_inverted ? -steps : steps);
+    if (indexed) {
+        follow_index(generator, *indexed, {index_from, plant_.steps(*indexed), steps});
+    }
+    if (probed) {
+        follow_switch(generator, {probe_from, plant_.steps(*probed), steps});
+    }
+}
+
+void EmulatedCard::follow_index(Generator& generator, std::size_t motor,
+                                const Movement& moved) noexcept {
+    using Input = PositionLatch::Input;
+    if (!generator.latch.is_armed(Input::index)) return;
+    const bool level = generator.latch.wants_rising(Input::index);
+    const auto at = plant_.step_of_index(motor, moved.from, moved.to, level);
+    if (!at) return;
+    const std::int64_t remaining = std::abs(moved.to - *at);
+    generator.latch.meet(Input::index, accumulator_at(generator.dds, moved.steps, remaining));
+}
+
+void EmulatedCard::follow_switch(Generator& generator, const Movement& moved) noexcept {
+    using Input = PositionLatch::Input;
+    const std::size_t which = *generator.probe.switch_index;
+    const auto at = plant_.step_of_change(which, moved.from, moved.to);
+    if (!at) return;
+    const bool level = plant_.is_closed(which);
+    const bool is_event = generator.latch.is_armed(Input::probe) &&
+                          level == generator.latch.wants_rising(Input::probe);
+    if (!is_event) return;
+    const std::int64_t remaining = std::abs(moved.to - *at);
+    generator.latch.meet(Input::probe, accumulator_at(generator.dds, moved.steps, remaining));
+}
+
+/// Inputs that no motor of theirs moves: buttons, and switches of another motor.
+void EmulatedCard::sample_latch_inputs() noexcept {
+    using Input = PositionLatch::Input;
+    for (unsigned unit = 0; unit < config_.instances(Tag::stepgen); ++unit) {
         Generator& generator = generators_[unit];
-        const std::int64_t steps = generator.dds.advance(clocks);
-        if (steps == 0) continue;
-        if (!is_driven_by_module(generator.step_pin)) continue;
-        if (!is_driven_by_module(generator.direction_pin)) continue;
-        const std::size_t pin = generator.direction_pin;
-        const bool is_inverted =
-            bit(ports_[pin / model_.pins].invert, static_cast<unsigned>(pin % model_.pins)) != 0;
-        plant_.step(unit, is_inverted ? -steps : steps);
+        if (!generator.latch.can_latch()) return;
+        if (!plant_.indexed_motor(unit)) {
+            sample(generator, Input::index, generator.index);
+        }
+        if (!generator.probe.switch_index) {
+            sample(generator, Input::probe, generator.probe);
+        }
+    }
+}
+
+void EmulatedCard::sample(Generator& generator, PositionLatch::Input which,
+                          LatchInput& input) noexcept {
+    if (input.pin == no_pin) return;
+    const bool level = outside_[input.pin];
+    const bool is_edge = std::exchange(input.level, level) != level;
+    if (is_edge && generator.latch.is_armed(which) &&
+        level == generator.latch.wants_rising(which)) {
+        generator.latch.meet(which, generator.dds.accumulator());
     }
 }
 
@@ -289,7 +432,8 @@ void EmulatedCard::feed_inputs() noexcept {
         const std::uint32_t mask = level ? 1U << terminal.number % 32 : 0U;
         switch (terminal.kind) {
         case Terminal::Kind::gpio: outside_[terminal.number] = level; break;
-        case Terminal::Kind::inm: inm_inputs_ |= mask; break;
+        case Terminal::Kind::inm:
+        case Terminal::Kind::inmux: inm_inputs_ |= mask; break;
         case Terminal::Kind::remote: remote_inputs[terminal.channel] |= mask; break;
         default: break;
         }
@@ -303,6 +447,14 @@ void EmulatedCard::feed_inputs() noexcept {
     for (unsigned channel = 0; channel < smart_serial::max_channels; ++channel) {
         if (Remote7i76* const remote = serial_.remote(channel)) {
             remote->inputs = remote_inputs[channel];
+        }
+    }
+    for (std::size_t unit = 0; unit < max_units; ++unit) {
+        if (counters_[unit].probe_pin != no_pin) {
+            counters_[unit].counter.set_probe(outside_[counters_[unit].probe_pin]);
+        }
+        if (fault_pins_[unit] != no_pin) {
+            bridges_[unit].sample(outside_[fault_pins_[unit]]);
         }
     }
 }
@@ -329,6 +481,7 @@ bool EmulatedCard::module_level(const PinDescriptor& pin) const noexcept {
             return (pwm_values_[pin.unit] & pwm::negative) != 0;
         }
         return std::fabs(pwm_duty(pwm_values_[pin.unit], 12)) > 0.5;
+    case Tag::three_phase_pwm: return bridges_[pin.unit].level(pin.number);
     case Tag::smart_serial: return true;  // a line at rest
     case Tag::ssr: return (ssr_rate_ & ssr::rate_enable) != 0 && bit(ssr_data_, pin.number - 1U);
     case Tag::outm: return bit(outm_data_, pin.number - 1U) != 0;
@@ -340,8 +493,13 @@ bool EmulatedCard::outside_level(std::size_t pin) const noexcept {
     const PinDescriptor is = descriptor(pin);
     if (is.is_output) return outside_[pin];
     if (is.module == Tag::inm) return bit(inm_inputs_, is.number - 1U) != 0;
-    if (is.module != Tag::encoder || !plant_.has_encoder(is.unit)) return outside_[pin];
-    const QuadratureCounter& counter = counters_[is.unit].counter;
+    const bool is_muxed = is.module == Tag::muxed_encoder;
+    if (is.module != Tag::encoder && !is_muxed) return outside_[pin];
+    if (is.number > pin_number::encoder::index) return outside_[pin];
+    // of two multiplexed encoders a reading shows the first
+    const unsigned unit = is_muxed ? is.unit * 2U : is.unit;
+    if (!plant_.has_encoder(unit)) return outside_[pin];
+    const QuadratureCounter& counter = counters_[unit].counter;
     if (is.number == pin_number::encoder::a) return counter.input_a();
     if (is.number == pin_number::encoder::b) return counter.input_b();
     return counter.input_index();
@@ -414,17 +572,17 @@ std::uint32_t EmulatedCard::read_module(const Place& at) noexcept {
     case Tag::watchdog: return watchdog_.read(at.reg);
     case Tag::ioport: return read_port(at.reg, at.instance);
     case Tag::stepgen: return read_stepgen(at.reg, at.instance);
-    case Tag::encoder: return read_encoder(at.reg, at.instance);
+    case Tag::encoder:
+    case Tag::muxed_encoder: return read_encoder(at.reg, at.instance);
+    case Tag::three_phase_pwm: return read_bridge(at.reg, at.instance);
     case Tag::pwm: return read_pwm(at.reg, at.instance);
     case Tag::dpll: return phase_loop_.read(at.reg);
     case Tag::smart_serial: return serial_.read(at.reg, at.channel);
     case Tag::ssr: return at.reg == ssr::data ? ssr_data_ : ssr_rate_;
     case Tag::outm: return outm_data_;
     case Tag::led: return leds_;
-    case Tag::inm: {
-        const std::uint32_t registers[] = {inm_control_, inm_filter_, inm_inputs_, inm_inputs_, 0};
-        return registers[at.reg];
-    }
+    case Tag::inm:
+    case Tag::inmux: return read_inputs(at.reg);
     default: return 0;
     }
 }
@@ -434,7 +592,9 @@ void EmulatedCard::write_module(const Place& at, std::uint32_t value) noexcept {
     case Tag::watchdog: watchdog_.write(at.reg, value, clock_); break;
     case Tag::ioport: write_port(at.reg, at.instance, value); break;
     case Tag::stepgen: write_stepgen(at.reg, at.instance, value); break;
-    case Tag::encoder: write_encoder(at.reg, at.instance, value); break;
+    case Tag::encoder:
+    case Tag::muxed_encoder: write_encoder(at.reg, at.instance, value); break;
+    case Tag::three_phase_pwm: write_bridge(at.reg, at.instance, value); break;
     case Tag::pwm: write_pwm(at.reg, at.instance, value); break;
     case Tag::dpll: phase_loop_.write(at.reg, value); break;
     case Tag::smart_serial: serial_.write(at.reg, at.channel, value, now_ns()); break;
@@ -442,12 +602,7 @@ void EmulatedCard::write_module(const Place& at, std::uint32_t value) noexcept {
     case Tag::outm: outm_data_ = value; break;
     case Tag::led: leds_ = value; break;
     case Tag::inm:
-        if (at.reg == inm::control) {
-            inm_control_ = (value & ~0x1fU) | (inm_control_ & 0x1fU);
-        } else if (at.reg == inm::filter) {
-            inm_filter_ = value;
-        }
-        break;
+    case Tag::inmux: write_inputs(at.reg, value); break;
     default: break;
     }
 }
@@ -482,7 +637,7 @@ std::uint32_t EmulatedCard::read_stepgen(unsigned reg, unsigned unit) const noex
     case stepgen::rate: return static_cast<std::uint32_t>(of.dds.rate());
     case stepgen::accumulator:
         return timer_of(stepgen_timer_) != 0 ? of.latched : of.dds.accumulator();
-    case stepgen::mode: return of.mode;
+    case stepgen::mode: return of.latch.read();
     case stepgen::dpll_timer: return stepgen_timer_;
     default: return 0;
     }
@@ -494,7 +649,7 @@ void EmulatedCard::write_stepgen(unsigned reg, unsigned unit, std::uint32_t valu
     switch (reg) {
     case stepgen::rate: of.dds.set_rate(static_cast<std::int32_t>(value)); break;
     case stepgen::accumulator: of.dds.set_accumulator(value); break;
-    case stepgen::mode: of.mode = value; break;
+    case stepgen::mode: of.latch.write(value); break;
     case stepgen::direction_setup: of.dds.times().setup = clocks; break;
     case stepgen::direction_hold: of.dds.times().hold = clocks; break;
     case stepgen::pulse_length: of.dds.times().length = clocks; break;
@@ -546,6 +701,40 @@ void EmulatedCard::write_pwm(unsigned reg, unsigned unit, std::uint32_t value) n
     case pwm::pwm_rate: pwm_rate_ = value; break;
     case pwm::pdm_rate: pdm_rate_ = value; break;
     default: pwm_enables_ = value; break;
+    }
+}
+
+std::uint32_t EmulatedCard::read_bridge(unsigned reg, unsigned unit) const noexcept {
+    return reg == three_phase_pwm::enable ? bridges_[unit].enable() : 0;
+}
+
+void EmulatedCard::write_bridge(unsigned reg, unsigned unit, std::uint32_t value) noexcept {
+    BridgeDriver& of = bridges_[unit];
+    switch (reg) {
+    case three_phase_pwm::value: of.value = value; break;
+    case three_phase_pwm::enable: of.write_enable(value); break;
+    case three_phase_pwm::setup: of.setup = value; break;
+    default: bridge_rate_ = value; break;
+    }
+    if (fault_pins_[unit] != no_pin) {
+        of.sample(outside_[fault_pins_[unit]]);
+    }
+}
+
+std::uint32_t EmulatedCard::read_inputs(unsigned reg) const noexcept {
+    switch (reg) {
+    case inm::control: return inm_control_;
+    case inm::filter: return inm_filter_;
+    case inm::counters: return 0;
+    default: return inm_inputs_;
+    }
+}
+
+void EmulatedCard::write_inputs(unsigned reg, std::uint32_t value) noexcept {
+    if (reg == inm::control) {
+        inm_control_ = (value & ~0x1fU) | (inm_control_ & 0x1fU);
+    } else if (reg == inm::filter) {
+        inm_filter_ = value;
     }
 }
 

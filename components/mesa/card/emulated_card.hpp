@@ -5,12 +5,15 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
+#include "mesa/card/bridge_driver.hpp"
 #include "mesa/card/card_config.hpp"
 #include "mesa/card/phase_loop.hpp"
 #include "mesa/card/plant.hpp"
+#include "mesa/card/position_latch.hpp"
 #include "mesa/card/quadrature_counter.hpp"
 #include "mesa/card/serial_port.hpp"
 #include "mesa/card/step_generator.hpp"
@@ -67,15 +70,29 @@ private:
     struct Port {
         std::uint32_t data = 0, direction = 0, source = 0, open_drain = 0, invert = 0;
     };
+    /// An input that latches, and the switch on it.
+    struct LatchInput {
+        std::size_t pin = SIZE_MAX;
+        std::optional<std::size_t> switch_index;  ///< of the motor of the step generator
+        bool level = true;
+    };
     struct Generator {
         StepGenerator dds;
-        std::uint32_t mode = 0, table_data = 0, table_length = 0;
+        std::uint32_t table_data = 0, table_length = 0;
         std::uint32_t latched = 0;  ///< accumulator at the timer
         std::size_t step_pin = 0, direction_pin = 0;
+        PositionLatch latch;  ///< and the mode
+        LatchInput index, probe;
     };
     struct Counter {
         QuadratureCounter counter;
         std::uint32_t latched = 0;
+        std::size_t probe_pin = SIZE_MAX;
+    };
+    /// The movement of a motor by the steps of a generator.
+    struct Movement {
+        std::int64_t from = 0, to = 0;  ///< of the motor
+        std::int64_t steps = 0;  ///< of the generator
     };
 
     // Setup
@@ -85,6 +102,12 @@ private:
     // Time
     void run(std::int64_t clocks) noexcept;
     void move_motors(std::int64_t clocks) noexcept;
+    bool drives_motor(const Generator& generator) const noexcept;
+    void step_motor(unsigned unit, std::int64_t steps) noexcept;
+    void follow_index(Generator& generator, std::size_t motor, const Movement& moved) noexcept;
+    void follow_switch(Generator& generator, const Movement& moved) noexcept;
+    void sample_latch_inputs() noexcept;
+    void sample(Generator& generator, PositionLatch::Input which, LatchInput& input) noexcept;
     void command_spindles() noexcept;
     void turn_encoders(std::int64_t clocks) noexcept;
     void feed_inputs() noexcept;
@@ -104,9 +127,16 @@ private:
     void write_encoder(unsigned reg, unsigned unit, std::uint32_t value) noexcept;
     std::uint32_t read_pwm(unsigned reg, unsigned unit) const noexcept;
     void write_pwm(unsigned reg, unsigned unit, std::uint32_t value) noexcept;
+    std::uint32_t read_bridge(unsigned reg, unsigned unit) const noexcept;
+    void write_bridge(unsigned reg, unsigned unit, std::uint32_t value) noexcept;
+    std::uint32_t read_inputs(unsigned reg) const noexcept;
+    void write_inputs(unsigned reg, std::uint32_t value) noexcept;
 
     // Pins
     PinDescriptor descriptor(std::size_t pin) const noexcept;
+    bool has_pin(const PinDescriptor& pin) const noexcept;
+    void find_latch_inputs(unsigned unit);
+    std::size_t find_input(Tag tag, unsigned unit, unsigned number) const noexcept;
     bool is_output(std::size_t pin) const noexcept;
     bool is_driven_by_module(std::size_t pin) const noexcept;
     bool level(std::size_t pin) const noexcept;
@@ -152,7 +182,10 @@ private:
     std::array<std::size_t, max_units> pwm_pins_{};
     std::uint32_t pwm_rate_ = 0, pdm_rate_ = 0, pwm_enables_ = 0;
     std::uint32_t ssr_data_ = 0, ssr_rate_ = 0, outm_data_ = 0, leds_ = 0;
-    std::uint32_t inm_control_ = 0, inm_filter_ = 0, inm_inputs_ = 0;
+    std::array<BridgeDriver, max_units> bridges_{};
+    std::array<std::size_t, max_units> fault_pins_{};
+    std::uint32_t bridge_rate_ = 0;
+    std::uint32_t inm_control_ = 0, inm_filter_ = 0, inm_inputs_ = 0;  ///< of InM or InMux
 
     std::vector<bool> inputs_;  ///< levels of the inputs of the configuration
     std::vector<bool> outside_;  ///< levels that the machine puts on the pins

@@ -87,12 +87,58 @@ bool Plant::has_encoder(unsigned encoder) const noexcept {
         encoders_, [&](const EncoderMotion& motion) { return motion.encoder == encoder; });
 }
 
+bool Plant::is_closed_at(const SwitchConfig& one, double position) const noexcept {
+    const bool is_below = one.below && position < *one.below;
+    const bool is_there = is_below || (one.above && position > *one.above);
+    return is_there != one.normally_closed;
+}
+
 bool Plant::is_closed(std::size_t switch_index) const noexcept {
-    const SwitchConfig& config = config_.switches[switch_index];
-    const double at = position(config.motor_index);
-    const bool is_below = config.below && at < *config.below;
-    const bool is_there = is_below || (config.above && at > *config.above);
-    return is_there != config.normally_closed;
+    const SwitchConfig& one = config_.switches[switch_index];
+    return is_closed_at(one, position(one.motor_index));
+}
+
+std::optional<std::size_t> Plant::indexed_motor(unsigned stepgen) const noexcept {
+    for (std::size_t n = 0; n < config_.motors.size(); ++n) {
+        const MotorConfig& motor = config_.motors[n];
+        const bool has_index = motor.index_every != 0.0 && !motor.encoder;
+        if (motor.stepgen == stepgen && has_index) return n;
+    }
+    return {};
+}
+
+std::optional<std::int64_t> Plant::step_of_change(std::size_t switch_index, std::int64_t from,
+                                                  std::int64_t to) const noexcept {
+    const SwitchConfig& one = config_.switches[switch_index];
+    const double scale = config_.motors[one.motor_index].scale;
+    const auto is_closed_behind = [&](std::int64_t steps) {
+        return is_closed_at(one, static_cast<double>(steps) / scale);
+    };
+    const bool before = is_closed_behind(from);
+    if (is_closed_behind(to) == before) return {};
+    // `from` is before the change, and `to` behind it
+    while (std::abs(to - from) > 1) {
+        const std::int64_t middle = from + (to - from) / 2;
+        (is_closed_behind(middle) == before ? from : to) = middle;
+    }
+    return to;
+}
+
+std::optional<std::int64_t> Plant::step_of_index(std::size_t motor, std::int64_t from,
+                                                 std::int64_t to, bool level) const noexcept {
+    const MotorConfig& config = config_.motors[motor];
+    const std::int64_t every = std::abs(rounded(config.index_every * config.scale));
+    if (every < 2 || from == to) return {};
+    const std::int64_t direction = to > from ? 1 : -1;
+    // the index ends a step behind its position
+    const std::int64_t shift = level ? 0 : direction;
+    const std::int64_t next = (from - shift) * direction + 1;
+    const std::int64_t remainder = (next % every + every) % every;
+    const std::int64_t first = next + (remainder == 0 ? 0 : every - remainder);
+    const std::int64_t at = first * direction + shift;
+    const bool is_within = direction > 0 ? at <= to : at >= to;
+    if (!is_within) return {};
+    return at;
 }
 
 }  // namespace hal::mesa

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -36,6 +37,18 @@ public:
     /// What the encoders saw in the last advance().
     std::span<const EncoderMotion> encoders() const noexcept { return encoders_; }
 
+    /// Returns the motor behind a step generator that has an index for it: one without an encoder.
+    /// [any]
+    std::optional<std::size_t> indexed_motor(unsigned stepgen) const noexcept;
+    std::int64_t steps(std::size_t motor) const noexcept { return motors_[motor].steps; }
+    /// Returns the step at which a switch changes between two positions of its motor; nothing: it
+    /// does not.
+    std::optional<std::int64_t> step_of_change(std::size_t switch_index, std::int64_t from,
+                                               std::int64_t to) const noexcept;
+    /// Returns the first step between two positions at which the index of a motor, a step wide,
+    /// becomes `level`.
+    std::optional<std::int64_t> step_of_index(std::size_t motor, std::int64_t from, std::int64_t to,
+                                              bool level) const noexcept;
     bool has_encoder(unsigned encoder) const noexcept;
     bool is_closed(std::size_t switch_index) const noexcept;
     /// Position in units of length.
@@ -61,6 +74,7 @@ private:
         double edges_per_unit = 1.0;
         double edges = 0.0;
     };
+    bool is_closed_at(const SwitchConfig& one, double position) const noexcept;
     double unit_of(const Feedback& feedback) const noexcept;
 
     const CardConfig& config_;

@@ -23,14 +23,27 @@ std::int64_t first_index(const QuadratureCounter::Motion& m) noexcept {
 
 }  // namespace
 
+/// Latches when the bit `arming` is set.
+void QuadratureCounter::latch(std::uint16_t count, std::uint32_t arming) noexcept {
+    if ((control_ & arming) == 0) return;
+    latch_ = count;
+    if ((control_ & encoder::just_once) != 0) {
+        control_ &= ~arming;
+    }
+}
+
+void QuadratureCounter::set_probe(bool level) noexcept {
+    const bool wants_rising = (control_ & encoder::probe_polarity) != 0;
+    const bool is_event = level != probe_ && level == wants_rising;
+    probe_ = level;
+    if (is_event) {
+        latch(count_, encoder::latch_on_probe);
+    }
+}
+
 void QuadratureCounter::meet_index(std::int64_t at, const Motion& motion) noexcept {
     const auto there = static_cast<std::uint16_t>(count_ + (at - motion.from));
-    if ((control_ & encoder::latch_on_index) != 0) {
-        latch_ = there;
-        if ((control_ & encoder::just_once) != 0) {
-            control_ &= ~encoder::latch_on_index;
-        }
-    }
+    latch(there, encoder::latch_on_index);
     if ((control_ & encoder::clear_on_index) != 0) {
         count_ = static_cast<std::uint16_t>(count_ - there);
     }

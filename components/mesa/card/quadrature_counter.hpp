@@ -17,6 +17,8 @@ public:
         std::uint16_t last_edge = 0;   ///< time stamp of the newest edge
     };
     void move(const Motion& motion) noexcept;
+    /// The level of the probe input; an edge may be latched.
+    void set_probe(bool level) noexcept;
 
     std::uint32_t count_register() const noexcept {
         return std::uint32_t{count_} | std::uint32_t{last_edge_} << 16;
@@ -28,6 +30,7 @@ public:
     bool input_index() const noexcept { return at_index_; }
 
 private:
+    void latch(std::uint16_t count, std::uint32_t arming) noexcept;
     void meet_index(std::int64_t at, const Motion& motion) noexcept;
 
     std::uint16_t count_ = 0;
@@ -36,6 +39,7 @@ private:
     std::uint32_t control_ = 0;  ///< without the inputs
     std::int64_t position_ = 0;
     bool at_index_ = false;
+    bool probe_ = true;  ///< pulled up
 };
 
 }  // namespace hal::mesa

@@ -68,12 +68,21 @@ std::string sentence_of(IdromFault fault, const Idrom& idrom) {
     return {};
 }
 
+/// Versions with flags in their upper bits are written as in the sources of the firmware: 0xC2.
+std::string version_text(std::uint8_t version) {
+    return version < 0x10 ? std::to_string(version) : hex(version, 2);
+}
+
 std::string versions_of(const ModuleKind& kind) {
     std::string text;
     for (const std::uint8_t version : kind.versions) {
-        text += (text.empty() ? "" : ", ") + std::to_string(version);
+        text += (text.empty() ? "" : ", ") + version_text(version);
     }
     return text;
+}
+
+std::string instances_text(unsigned count) {
+    return std::to_string(count) + (count == 1 ? " instance" : " instances");
 }
 
 std::string sentence_of(ModuleFault fault, const CardModule& module, const ModuleKind& kind) {
@@ -82,7 +91,7 @@ std::string sentence_of(ModuleFault fault, const CardModule& module, const Modul
     switch (fault) {
     case ModuleFault::none: return {};
     case ModuleFault::version:
-        return name + " has version " + std::to_string(d.version) + "; the driver supports " +
+        return name + " has version " + version_text(d.version) + "; the driver supports " +
                versions_of(kind);
     case ModuleFault::registers:
         return name + " has " + std::to_string(d.registers) + " registers; the driver supports " +
@@ -134,6 +143,35 @@ std::uint16_t read_firmware(SetupLink& link, const CardImage& image) {
     return load<std::uint16_t>(head.data() + 12);
 }
 
+/// The modules that use the pins of a driver: one descriptor has all their instances.
+bool is_same_module(Tag one, Tag other) noexcept {
+    const auto kind = [](Tag tag) { return tag == Tag::muxed_encoder ? Tag::encoder : tag; };
+    return kind(one) == kind(other);
+}
+
+/// Rejects a descriptor of a known module that the driver cannot use.
+void check_module(const CardImage& image, const CardModule& module) {
+    const ModuleDescriptor& descriptor = module.descriptor;
+    const ModuleKind* const kind = kind_of(descriptor.tag);
+    if (kind == nullptr) return;
+    const ModuleFault fault = fault_of(descriptor, *kind, image.idrom);
+    if (fault != ModuleFault::none) {
+        reject(image, sentence_of(fault, module, *kind));
+    }
+    if (descriptor.instances > max_register_bits) {
+        reject(image, "module " + std::string(kind->name) + " of the firmware has " +
+                          std::to_string(descriptor.instances) +
+                          " instances; the driver supports up to 32");
+    }
+    for (const CardModule& before : image.modules) {
+        if (!is_same_module(before.tag(), descriptor.tag)) continue;
+        const std::string first(name_of(before.tag()));
+        const std::string second(kind->name);
+        reject(image, "the firmware has the modules " + first + " and " + second +
+                          "; the driver supports one of this kind");
+    }
+}
+
 void read_modules(SetupLink& link, CardImage& image, std::uint16_t at) {
     for (std::size_t n = 0; n < max_modules; ++n) {
         const auto address = static_cast<std::uint16_t>(at + n * ModuleDescriptor::size);
@@ -144,17 +182,7 @@ void read_modules(SetupLink& link, CardImage& image, std::uint16_t at) {
         module.descriptor = *descriptor;
         module.addresses = ModuleAddresses(*descriptor, image.idrom);
         module.clock_hz = clock_hz(*descriptor, image.idrom);
-        if (const ModuleKind* kind = kind_of(descriptor->tag)) {
-            const ModuleFault fault = fault_of(*descriptor, *kind, image.idrom);
-            if (fault != ModuleFault::none) {
-                reject(image, sentence_of(fault, module, *kind));
-            }
-            if (descriptor->instances > max_register_bits) {
-                reject(image, "module " + std::string(kind->name) + " of the firmware has " +
-                                  std::to_string(descriptor->instances) +
-                                  " instances; the driver supports up to 32");
-            }
-        }
+        check_module(image, module);
         image.modules.push_back(module);
     }
 }
@@ -198,6 +226,8 @@ bool is_used(const CardImage& image, const ConfigString& config, const PinDescri
         return (image.serial_channels(config, pin.unit) >> serial_channel(pin) & 1U) != 0;
     }
     if (pin.unit == PinDescriptor::all_units) return true;
+    // the pins of a unit have two encoders, which the multiplexer selects
+    if (pin.module == Tag::muxed_encoder) return pin.unit < (module->used + 1) / 2;
     if (pin.module == Tag::ssr || pin.module == Tag::outm || pin.module == Tag::inm ||
         pin.module == Tag::inmux) {
         return pin.unit < module->used;
@@ -207,6 +237,25 @@ bool is_used(const CardImage& image, const ConfigString& config, const PinDescri
         return false;
     }
     return pin.unit < module->used;
+}
+
+/// What this driver does with a module.
+enum class ModuleUse : std::uint8_t {
+    driven,
+    without_pins,  ///< in LinuxCNC, a component of the user calls C functions for it
+    unsupported,
+    unknown,
+};
+ModuleUse use_of(Tag tag) noexcept {
+    switch (tag) {
+    case Tag::uart_transmit:
+    case Tag::uart_receive:
+    case Tag::packet_uart_transmit:
+    case Tag::packet_uart_receive: return ModuleUse::without_pins;
+    default: break;
+    }
+    if (kind_of(tag) != nullptr) return ModuleUse::driven;
+    return name_of(tag) == "?" ? ModuleUse::unknown : ModuleUse::unsupported;
 }
 
 CardModule example_module(Tag tag, std::uint8_t version, std::uint8_t instances,
@@ -295,9 +344,13 @@ std::string apply(const ConfigString& config, CardImage& image) {
                    " all of them are used";
         }
         module.used = asked == ConfigString::all ? present : static_cast<unsigned>(asked);
+        if (use_of(module.tag()) != ModuleUse::driven) {
+            module.used = 0;  // so its pins are GPIO
+        }
     }
-    for (const Tag tag : {Tag::encoder, Tag::stepgen, Tag::pwm, Tag::ssr, Tag::inm, Tag::inmux,
-                          Tag::outm, Tag::dpll, Tag::led}) {
+    for (const Tag tag : {Tag::encoder, Tag::stepgen, Tag::pwm, Tag::three_phase_pwm, Tag::ssr,
+                          Tag::inm, Tag::inmux, Tag::outm, Tag::dpll, Tag::led, Tag::uart_transmit,
+                          Tag::packet_uart_transmit}) {
         const bool is_muxed = tag == Tag::encoder && image.find(Tag::muxed_encoder) != nullptr;
         if (is_muxed || image.find(tag) != nullptr || config.count(tag) <= 0) continue;
         return image.address + " (" + image.card + "): config asks for " +
@@ -308,6 +361,32 @@ std::string apply(const ConfigString& config, CardImage& image) {
         pin.is_gpio = !is_used(image, config, pin.descriptor);
     }
     return {};
+}
+
+std::vector<std::string> unused_modules(const CardImage& image) {
+    std::vector<std::string> texts;
+    for (const CardModule& module : image.modules) {
+        const ModuleDescriptor& d = module.descriptor;
+        const std::string name(name_of(d.tag));
+        const std::string details = "tag " + hex(static_cast<std::uint8_t>(d.tag), 2) +
+                                    ", version " + version_text(d.version) + ", " +
+                                    instances_text(d.instances);
+        switch (use_of(d.tag)) {
+        case ModuleUse::driven: break;
+        case ModuleUse::without_pins:
+            texts.push_back("module " + name + " (" + details +
+                            ") is not used: UARTs have no pins in HAL; its I/O pins are GPIO");
+            break;
+        case ModuleUse::unsupported:
+            texts.push_back("module " + name + " (" + details +
+                            ") is not supported; its I/O pins are GPIO");
+            break;
+        case ModuleUse::unknown:
+            texts.push_back("unknown module (" + details + ") is not used; its I/O pins are GPIO");
+            break;
+        }
+    }
+    return texts;
 }
 
 CardImage example_card() {

@@ -52,6 +52,10 @@ CardImage probe(SetupLink& link);
 /// Marks what is used. Returns the problem, or "": the config asks for more than there is.
 std::string apply(const ConfigString& config, CardImage& image);
 
+/// Describes each module of the firmware that is not used, whatever the config asks for: UARTs, and
+/// modules without a driver.
+std::vector<std::string> unused_modules(const CardImage& image);
+
 /// Returns a small 7I76E, for texts about the component without a card.
 CardImage example_card();
 

@@ -17,14 +17,35 @@ struct Item {
 
 // The names of hostmot2 for modules without a driver here are accepted with 0 or -1.
 constexpr Item items[] = {
-    {"num_encoders", Tag::encoder}, {"num_stepgens", Tag::stepgen}, {"num_pwmgens", Tag::pwm},
-    {"num_leds", Tag::led},         {"num_ssrs", Tag::ssr},         {"num_inms", Tag::inm},
-    {"num_inmuxs", Tag::inmux},     {"num_inmux", Tag::inmux},      {"num_outms", Tag::outm},
-    {"num_dplls", Tag::dpll},       {"num_3pwmgens", Tag::none},    {"num_bspis", Tag::none},
-    {"num_uarts", Tag::none},       {"num_pktuarts", Tag::none},    {"num_resolvers", Tag::none},
-    {"num_rcpwmgens", Tag::none},   {"num_xy2mods", Tag::none},     {"num_oneshots", Tag::none},
-    {"num_periodms", Tag::none},    {"num_tp_pwmgens", Tag::none},
+    {"num_encoders", Tag::encoder},
+    {"num_stepgens", Tag::stepgen},
+    {"num_pwmgens", Tag::pwm},
+    {"num_leds", Tag::led},
+    {"num_ssrs", Tag::ssr},
+    {"num_inms", Tag::inm},
+    {"num_inmuxs", Tag::inmux},
+    {"num_inmux", Tag::inmux},
+    {"num_outms", Tag::outm},
+    {"num_dplls", Tag::dpll},
+    {"num_3pwmgens", Tag::three_phase_pwm},
+    {"num_uarts", Tag::uart_transmit},
+    {"num_pktuarts", Tag::packet_uart_transmit},
+    {"num_bspis", Tag::none},
+    {"num_resolvers", Tag::none},
+    {"num_rcpwmgens", Tag::none},
+    {"num_xy2mods", Tag::none},
+    {"num_oneshots", Tag::none},
+    {"num_periodms", Tag::none},
 };
+/// The module whose item counts the instances of another one as well.
+Tag counted_as(Tag tag) noexcept {
+    switch (tag) {
+    case Tag::muxed_encoder: return Tag::encoder;
+    case Tag::uart_receive: return Tag::uart_transmit;
+    case Tag::packet_uart_receive: return Tag::packet_uart_transmit;
+    default: return tag;
+    }
+}
 constexpr std::string_view other_items[] = {"enable_raw",     "stepgen_width",  "sserial_port_0",
                                             "sserial_port_1", "sserial_port_2", "sserial_port_3"};
 constexpr std::string_view port_prefix = "sserial_port_";
@@ -133,7 +154,7 @@ ConfigString::Problem ConfigString::parse_ports(std::string_view key, std::strin
 }
 
 int ConfigString::count(Tag tag) const noexcept {
-    const Tag used = tag == Tag::muxed_encoder ? Tag::encoder : tag;
+    const Tag used = counted_as(tag);
     // the last item of several counts
     for (std::size_t n = counts_.size(); n-- > 0;) {
         if (counts_[n].tag == used) return counts_[n].instances;
@@ -147,7 +168,7 @@ int ConfigString::serial_mode(std::size_t port, std::size_t channel) const noexc
 }
 
 std::string_view ConfigString::item_of(Tag tag) noexcept {
-    const Tag used = tag == Tag::muxed_encoder ? Tag::encoder : tag;
+    const Tag used = counted_as(tag);
     for (const Item& item : items) {
         if (used != Tag::none && item.tag == used) return item.name;
     }

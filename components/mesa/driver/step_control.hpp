@@ -58,6 +58,9 @@ public:
         error_at_match_ = 0.0;
         return apply(command, period_s, limits);
     }
+    /// Positions are smaller by `distance` from now on: a command in the new ones is not a movement.
+    /// [realtime]
+    void move_origin(double distance) noexcept { command_ -= distance; }
     /// Sets the velocity that the generator really has: rates are whole numbers. [realtime]
     void set_velocity(double velocity) noexcept { velocity_ = velocity; }
 

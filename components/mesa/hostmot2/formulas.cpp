@@ -55,6 +55,10 @@ std::uint32_t encoder_filter(double hz, std::uint32_t clock_hz) noexcept {
     return clipped(clock_hz / hz - 2.0, 0xfff);
 }
 
+std::uint32_t encoder_skew(double ns, std::uint32_t clock_hz) noexcept {
+    return clipped(ns * clock_hz / 1e9 + 0.5, encoder::max_skew);
+}
+
 PwmRate pwm_rate(double hz, std::uint32_t clock_hz) noexcept {
     PwmRate result;
     for (result.bits = 12; result.bits >= 9; --result.bits) {
@@ -83,6 +87,35 @@ double pwm_duty(std::uint32_t value, unsigned bits) noexcept {
     const double most = (1U << bits) - 1.0;
     const double magnitude = (value & ~pwm::negative) / 65536.0 / most;
     return (value & pwm::negative) != 0 ? -magnitude : magnitude;
+}
+
+std::uint32_t three_phase_rate(double hz, std::uint32_t clock_hz) noexcept {
+    return clipped(hz * 65536.0 * 2048.0 / clock_hz, 65535.0);
+}
+
+std::uint32_t three_phase_value(double a, double b, double c) noexcept {
+    std::uint32_t value = 0;
+    for (const double duty : {c, b, a}) {
+        const double within = std::isfinite(duty) ? std::clamp(duty, -1.0, 1.0) : 0.0;
+        const auto bits = static_cast<std::uint32_t>(512.0 + 511.0 * within);
+        value = value << three_phase_pwm::duty_bits | bits;
+    }
+    return value;
+}
+
+double three_phase_duty(std::uint32_t value, unsigned phase) noexcept {
+    const std::uint32_t bits = value >> phase * three_phase_pwm::duty_bits & 0x3ffU;
+    return (bits - 512.0) / 511.0;
+}
+
+std::uint32_t three_phase_dead_time(double ns, std::uint32_t rate,
+                                    std::uint32_t clock_hz) noexcept {
+    const double unit_ns = 2.0 * 65536.0 * 1e9 / clock_hz / std::max(rate, 1U);
+    return clipped(ns / unit_ns, three_phase_pwm::max_dead_time);
+}
+
+std::uint32_t three_phase_sample(double share) noexcept {
+    return clipped(std::min(share, 1.0) * 1023.0, 1023.0);
 }
 
 std::uint32_t ssr_rate(double hz, std::uint32_t clock_hz) noexcept {

@@ -25,6 +25,9 @@ double timestamp_hz(std::uint32_t divider, std::uint32_t clock_hz) noexcept;
 /// Filter register of encoders: clock / Hz - 2, at most FFFh. [any]
 std::uint32_t encoder_filter(double hz, std::uint32_t clock_hz) noexcept;
 
+/// Skew of the samples of multiplexed encoders in clocks, 0..15, rounded. [any]
+std::uint32_t encoder_skew(double ns, std::uint32_t clock_hz) noexcept;
+
 /// Rate and resolution of PWM.
 struct PwmRate {
     std::uint32_t rate = 0;
@@ -38,6 +41,18 @@ std::uint32_t pdm_rate(double pulses_per_s, std::uint32_t clock_hz) noexcept;
 /// Value register: |duty| x (2^bits - 1) in bits 16.., the sign in bit 31. `duty` -1..1. [any]
 std::uint32_t pwm_value(double duty, unsigned bits) noexcept;
 double pwm_duty(std::uint32_t value, unsigned bits) noexcept;
+
+/// Rate register of three-phase PWM: Hz x 65536 x 2048 / clock, at most 65535. The clock is the high
+/// one. [any]
+std::uint32_t three_phase_rate(double hz, std::uint32_t clock_hz) noexcept;
+/// Value register of three phases: each 512 + 511 x `duty` of -1..1, in 10 bits. [any]
+std::uint32_t three_phase_value(double a, double b, double c) noexcept;
+/// Returns the duty of phase 0..2, -1..1. [any]
+double three_phase_duty(std::uint32_t value, unsigned phase) noexcept;
+/// Dead time of a setup register, in units of 2 x 65536 / (clock x rate). [any]
+std::uint32_t three_phase_dead_time(double ns, std::uint32_t rate, std::uint32_t clock_hz) noexcept;
+/// Time of the sample of a setup register: 0 the start of a PWM cycle, 1 its end. [any]
+std::uint32_t three_phase_sample(double share) noexcept;
 
 /// Rate register of SSR, without its bit of enabling: clock / (2 Hz) - 2, 12 bits. [any]
 std::uint32_t ssr_rate(double hz, std::uint32_t clock_hz) noexcept;

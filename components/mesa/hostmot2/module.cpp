@@ -22,7 +22,7 @@ constexpr ModuleKind kinds[] = {
     {Tag::stepgen, "stepgen", stepgen_versions, 10, 4, 0x1ff},
     {Tag::pwm, "pwmgen", pwm_versions, 5, 4, 0x3},
     {Tag::muxed_encoder, "muxed encoder", muxed_versions, 5, 4, 0x3},
-    {Tag::three_phase_pwm, "three-phase PWM", version_0, 4, 4, 0x3},
+    {Tag::three_phase_pwm, "3pwmgen", version_0, 4, 4, 0x3},
     {Tag::uart_transmit, "UART transmit", version_0, 4, 0x10, 0xf},
     {Tag::uart_receive, "UART receive", version_0, 4, 0x10, 0xf},
     {Tag::packet_uart_transmit, "packet UART transmit", packet_uart_versions, 4, 4, 0xf},
@@ -35,6 +35,35 @@ constexpr ModuleKind kinds[] = {
     {Tag::smart_serial, "sserial", version_0, 6, 0x40, 0x3c},
     {Tag::wide_smart_serial, "sserial", version_0, 10, 0x40, 0x3fc},
     {Tag::ssr, "ssr", {}, 0, 0, 0},
+};
+
+/// Modules without a driver here.
+struct OtherModule {
+    std::uint8_t tag;
+    std::string_view name;
+};
+constexpr OtherModule other_modules[] = {
+    {0x07, "SPI"},
+    {0x08, "SSI"},
+    {0x0b, "translation RAM"},
+    {0x0e, "buffered SPI"},
+    {0x0f, "decoded buffered SPI"},
+    {0x10, "old DPLL"},
+    {0x11, "muxed encoder with index mask"},
+    {0x14, "waveform generator"},
+    {0x15, "data acquisition FIFO"},
+    {0x16, "binary oscillator"},
+    {0x17, "demand-mode DMA"},
+    {0x18, "BiSS"},
+    {0x19, "Fanuc encoder"},
+    {0x2a, "data painter"},
+    {0x2b, "XY2-100 galvo"},
+    {0x2c, "RC PWM"},
+    {0x40, "long I/O port"},
+    {0xc0, "resolver"},
+    {0xc2, "twiddler"},
+    {0xc7, "one-shot"},
+    {0xc8, "period meter"},
 };
 
 }  // namespace
@@ -80,8 +109,10 @@ const ModuleKind* kind_of(Tag tag) noexcept {
 }
 
 std::string_view name_of(Tag tag) noexcept {
-    const ModuleKind* kind = kind_of(tag);
-    return kind == nullptr ? "?" : kind->name;
+    if (const ModuleKind* kind = kind_of(tag)) return kind->name;
+    const auto* const other =
+        std::ranges::find(other_modules, static_cast<std::uint8_t>(tag), &OtherModule::tag);
+    return other == std::end(other_modules) ? "?" : other->name;
 }
 
 ModuleFault fault_of(const ModuleDescriptor& module, const ModuleKind& kind,

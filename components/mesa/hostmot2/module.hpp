@@ -88,7 +88,8 @@ struct ModuleKind {
 };
 /// Returns nothing for an unknown module. [any]
 const ModuleKind* kind_of(Tag tag) noexcept;
-/// Returns the name of a kind of module; "?" if it is unknown. [any]
+/// Returns the name of a kind of module, also of one that no driver here can work with; "?" if it is
+/// unknown. [any]
 std::string_view name_of(Tag tag) noexcept;
 
 /// What a descriptor does not have in common with its kind.

@@ -37,10 +37,22 @@ constexpr Role roles[] = {
     {Tag::muxed_encoder, false, 3, 1, "index"},
     {Tag::muxed_encoder, false, 4, 1, "index-mask"},
     {Tag::muxed_encoder, false, 5, 1, "probe"},
+    {Tag::muxed_encoder, false, 6, 1, "shared-index"},
     {Tag::mux_select, true, 1, 2, "select-%u"},
     {Tag::pwm, true, 1, 1, "out0"},
     {Tag::pwm, true, 2, 1, "out1"},
     {Tag::pwm, true, 3, 1, "enable"},
+    {Tag::three_phase_pwm, true, 1, 1, "phase-A"},
+    {Tag::three_phase_pwm, true, 2, 1, "phase-B"},
+    {Tag::three_phase_pwm, true, 3, 1, "phase-C"},
+    {Tag::three_phase_pwm, true, 4, 1, "phase-A-inverted"},
+    {Tag::three_phase_pwm, true, 5, 1, "phase-B-inverted"},
+    {Tag::three_phase_pwm, true, 6, 1, "phase-C-inverted"},
+    {Tag::three_phase_pwm, true, 7, 1, "enable"},
+    {Tag::three_phase_pwm, false, 8, 1, "fault"},
+    {Tag::uart_transmit, true, 1, 1, "tx"},
+    {Tag::uart_transmit, true, 2, 1, "txen"},
+    {Tag::uart_receive, false, 1, 1, "rx"},
     {Tag::smart_serial, true, 1, 8, "tx%u"},
     {Tag::smart_serial, true, 11, 8, "txen%u"},
     {Tag::smart_serial, true, 21, 8, "not-txen%u"},
@@ -81,7 +93,7 @@ std::string role_of(const PinDescriptor& pin) {
 std::string function_of(const PinDescriptor& pin) {
     if (pin.module == Tag::none) return {};
     std::string text(name_of(pin.module));
-    if (kind_of(pin.module) == nullptr && pin.module != Tag::mux_select) {
+    if (text == "?") {
         char number[24];
         std::snprintf(number, sizeof number, "module-0x%02X", static_cast<unsigned>(pin.module));
         text = number;

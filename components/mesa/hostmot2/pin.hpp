@@ -50,6 +50,10 @@ inline constexpr std::uint8_t a = 1, b = 2, index = 3, mask = 4, probe = 5, shar
 namespace pwm {
 inline constexpr std::uint8_t out = 1, direction = 2, not_enable = 3;
 }
+namespace three_phase_pwm {
+/// Outputs, and the inverted ones 3 later; the fault is an input.
+inline constexpr std::uint8_t a = 1, b = 2, c = 3, first_inverted = 4, enable = 7, fault = 8;
+}  // namespace three_phase_pwm
 namespace smart_serial {
 /// Outputs: of channel c the pins first + c; inputs: receive + c.
 inline constexpr std::uint8_t first_transmit = 1, first_enable = 11, first_not_enable = 21,

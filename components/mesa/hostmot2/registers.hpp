@@ -43,6 +43,18 @@ inline constexpr std::uint32_t max_time = 0x3fff;  ///< clocks; the chip adds on
 inline constexpr std::uint32_t all_masters = 0xffffffff;
 enum class Mode : std::uint8_t { step_direction = 0, up_down = 1, quadrature = 2, table = 3 };
 inline constexpr std::uint32_t mode_mask = 3;
+/// Bits of `mode` in firmware that exchanges step and direction (version 42h), and that latches the
+/// accumulator as well (C2h). The chip clears the bit that has armed the latch at its event. With a
+/// polarity of 1 the rising edge is the event.
+inline constexpr std::uint32_t swap_step_direction = 1U << 2;
+inline constexpr std::uint32_t latch_on_index = 1U << 4;
+inline constexpr std::uint32_t index_polarity = 1U << 5;
+inline constexpr std::uint32_t latch_on_probe = 1U << 6;
+inline constexpr std::uint32_t probe_polarity = 1U << 7;
+/// The upper 24 bits of the latched accumulator, when `mode` is read.
+inline constexpr std::uint32_t latch_mask = 0xffffff00;
+inline constexpr std::uint8_t version_with_swap = 0x42;
+inline constexpr std::uint8_t version_with_latch = 0xc2;
 /// The register of DPLL timers: 0 is off.
 constexpr std::uint32_t dpll_select(unsigned timer) noexcept { return 0x8000U | timer << 12; }
 }  // namespace stepgen
@@ -70,6 +82,13 @@ inline constexpr std::uint32_t filter_15 = 1U << 11;
 inline constexpr std::uint32_t probe_polarity = 1U << 12;
 inline constexpr std::uint32_t latch_on_probe = 1U << 13;
 inline constexpr std::uint32_t quadrature_error = 1U << 15;
+/// `filter`: bits 0..11 the sample rate, 28..31 the skew of multiplexed inputs in clocks.
+inline constexpr std::uint32_t max_skew = 15;
+inline constexpr unsigned skew_shift = 28;
+/// Versions with this bit have a probe input.
+inline constexpr std::uint8_t version_with_probe = 0x80;
+/// Multiplexed encoders have a skew from this version on.
+inline constexpr std::uint8_t version_with_skew = 4;
 }  // namespace encoder
 
 namespace pwm {
@@ -86,6 +105,22 @@ inline constexpr std::uint32_t double_buffered = 1U << 5;
 inline constexpr std::uint32_t dither = 1U << 6;
 enum class Output : std::uint8_t { direction = 0, swapped = 1, up_down = 2, pdm = 3 };
 }  // namespace pwm
+
+namespace three_phase_pwm {
+/// `value`: three duties of 10 bits, A in the lowest. `setup`: bits 0..8 the dead time in 2 / f, 15
+/// the polarity of the fault input, 16..26 the time of the sample. f is the clock x `rate` / 65536.
+inline constexpr unsigned value = 0;
+inline constexpr unsigned enable = 1;
+inline constexpr unsigned setup = 2;
+inline constexpr unsigned rate = 3;
+inline constexpr unsigned duty_bits = 10;
+inline constexpr std::uint32_t max_dead_time = 511;
+inline constexpr std::uint32_t fault_on_high = 1U << 15;
+inline constexpr unsigned sample_shift = 16;
+/// Bits of `enable`. The fault input clears the first and sets the second; a write sets both.
+inline constexpr std::uint32_t is_enabled = 1;
+inline constexpr std::uint32_t has_fault = 2;
+}  // namespace three_phase_pwm
 
 namespace ssr {
 inline constexpr unsigned data = 0;

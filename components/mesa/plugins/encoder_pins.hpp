@@ -12,6 +12,7 @@
 #include "latch_timer.hpp"
 #include "mesa/driver/edge_velocity.hpp"
 #include "mesa/driver/position_counter.hpp"
+#include "mesa/driver/step_latch.hpp"
 #include "mesa/hostmot2/formulas.hpp"
 #include "mesa/hostmot2/registers.hpp"
 #include "module_pins.hpp"
@@ -28,6 +29,8 @@ namespace hal::mesa {
 ///   0      0      not armed: the write has not arrived
 ///   1      1      armed
 ///   0      1      the index has been seen; its count is in the upper half
+///
+/// The probe of newer firmware is latched in the same way by a bit of its own.
 class Encoder {
 public:
     Encoder(const PinOwner& o, unsigned unit, const CardModule& module)
@@ -82,6 +85,9 @@ public:
         hal::Retained(o.component, {{named(unit, "counter"), counter_}});
         hal::Retained(o.component, {{named(unit, "zero"), zero_}});
         hal::Retained(o.component, {{named(unit, "is-uncertain"), is_uncertain_}});
+        if ((module.descriptor.version & encoder::version_with_probe) != 0) {
+            probe_ = std::make_unique<Probe>(o, unit);
+        }
     }
 
     /// `count`: count and time of its edge; `control`: control and latch. [realtime] read
@@ -106,7 +112,7 @@ public:
                           vel_timeout_);
         }
         read_control(control);
-        follow_index(value, static_cast<std::int16_t>(control >> 16));
+        follow_latch(value, static_cast<std::int16_t>(control >> 16));
         show();
     }
     /// Returns true once after a gap in which it may have lost counts. [realtime] read
@@ -114,19 +120,22 @@ public:
     /// [realtime] write
     void transmit(Outgoing& out, const Writing&) noexcept {
         if (!is_read_) return;  // what is to be written depends on what is there
-        const std::uint32_t wanted = settings();
-        const bool is_armed = (control_ & encoder::just_once) != 0;
-        const bool differs = (control_ & setting_bits) != wanted;
         is_read_ = false;
+        const LatchSource source = wanted_source();
+        const std::uint32_t settings = this->settings();
+        const bool is_armed = (control_ & encoder::just_once) != 0;
+        const bool differs = (control_ & setting_bits) != settings;
         if (!is_armed) {
             is_done_ = false;
         }
-        // after an event, the bits are cleared before they are set again
-        const bool arms = index_enable_ && !is_done_;
-        if (arms != is_armed || (differs && !is_armed)) {
-            const std::uint32_t arm = encoder::latch_on_index | encoder::just_once;
-            out.put(control_address_, wanted | (arms ? arm : 0));
+        // after an event, and for another source, the bits are cleared before they are set again
+        const bool stays = is_armed && !is_done_ && source == source_;
+        const bool arms = source != LatchSource::none && !is_armed;
+        if (stays || (!arms && !is_armed && !differs)) return;
+        if (arms) {
+            source_ = source;
         }
+        out.put(control_address_, arms ? settings | arming_bits(source) : settings);
     }
 
 private:
@@ -136,10 +145,36 @@ private:
     static constexpr double max_gap_s = 1.0;
     static constexpr std::uint32_t setting_bits = encoder::index_polarity | encoder::mask_polarity |
                                                   encoder::use_mask | encoder::count_up_down |
-                                                  encoder::filter_15;
+                                                  encoder::filter_15 | encoder::probe_polarity;
 
     static const char* named(unsigned unit, const char* name) {
         return brief_name("encoder.%02u.%s", unit, name);
+    }
+    struct Probe {
+        Probe(const PinOwner& o, unsigned unit)
+            : enable(o.component, named(unit, "probe-enable"),
+                     "TRUE: the next event of the probe is latched, and makes this FALSE; "
+                     "index-enable goes first"),
+              invert(o.component, o.read, named(unit, "probe-invert"),
+                     "TRUE: the rising edge of the probe counts") {}
+        hal::Io<bool> enable;
+        hal::In<bool> invert;
+    };
+
+    LatchSource wanted_source() const noexcept {
+        if (index_enable_) return LatchSource::index;
+        return probe_ && probe_->enable ? LatchSource::probe : LatchSource::none;
+    }
+    /// Returns what the register arms, also before a reload of the component.
+    LatchSource armed_source() const noexcept {
+        if ((control_ & encoder::just_once) == 0) return LatchSource::none;
+        if ((control_ & encoder::latch_on_index) != 0) return LatchSource::index;
+        const bool is_probe = (control_ & encoder::latch_on_probe) != 0;
+        return is_probe ? LatchSource::probe : LatchSource::none;
+    }
+    static std::uint32_t arming_bits(LatchSource source) noexcept {
+        const bool is_index = source == LatchSource::index;
+        return encoder::just_once | (is_index ? encoder::latch_on_index : encoder::latch_on_probe);
     }
     std::uint32_t settings() const noexcept {
         std::uint32_t bits = filter_ ? encoder::filter_15 : 0;
@@ -147,20 +182,28 @@ private:
         bits |= index_invert_ ? encoder::index_polarity : 0;
         bits |= index_mask_ ? encoder::use_mask : 0;
         bits |= index_mask_invert_ ? encoder::mask_polarity : 0;
+        bits |= probe_ && probe_->invert ? encoder::probe_polarity : 0;
         return bits;
     }
     void read_control(std::uint32_t control) noexcept {
         control_ = control & 0xffffU;
         is_read_ = true;
+        if (source_ == LatchSource::none) {
+            source_ = armed_source();
+        }
         input_a_ = (control & encoder::input_a) != 0;
         input_b_ = (control & encoder::input_b) != 0;
         input_index_ = (control & encoder::input_index) != 0;
         quad_error_ = quad_error_enable_ && (control & encoder::quadrature_error) != 0;
     }
-    void follow_index(std::int16_t value, std::int16_t latch) noexcept {
-        const bool is_seen =
-            (control_ & encoder::just_once) != 0 && (control_ & encoder::latch_on_index) == 0;
-        if (!is_seen || is_done_ || !index_enable_) return;
+    void follow_latch(std::int16_t value, std::int16_t latch) noexcept {
+        constexpr std::uint32_t armed_bits = encoder::latch_on_index | encoder::latch_on_probe;
+        const bool is_seen = (control_ & encoder::just_once) != 0 && (control_ & armed_bits) == 0;
+        if (!is_seen || is_done_) return;
+        if (source_ == LatchSource::none) {
+            source_ = wanted_source();  // armed before a reload
+        }
+        if (source_ == LatchSource::none || source_ != wanted_source()) return;
         is_done_ = true;
         // the latch is from less than half of the range ago
         const auto since = static_cast<std::int16_t>(static_cast<std::uint16_t>(value) -
@@ -168,6 +211,10 @@ private:
         const std::int64_t raw = counter_.position() - since;
         rawlatch_ = static_cast<std::int32_t>(raw);
         latched_ = raw - zero_;
+        if (source_ == LatchSource::probe) {
+            probe_->enable = false;
+            return;
+        }
         if (!no_clear_on_index_) {
             zero_ = raw;
             is_uncertain_ = false;
@@ -203,6 +250,7 @@ private:
     bool may_have_lost_ = false;
     bool is_uncertain_ = false;  ///< until the count has a new zero
     bool is_done_ = false;  ///< the event that the register shows has been handled
+    LatchSource source_ = LatchSource::none;  ///< what the register arms
 
     hal::Out<std::int32_t> count_, rawcounts_, rawlatch_, count_latched_;
     hal::Out<double> position_, position_latched_, position_interpolated_, velocity_, velocity_rpm_;
@@ -212,6 +260,7 @@ private:
     ScaleParam scale_;
     hal::Param<bool> index_invert_, index_mask_, index_mask_invert_, counter_mode_, filter_;
     hal::Param<double> vel_timeout_;
+    std::unique_ptr<Probe> probe_;  ///< of firmware that has one
 };
 
 class EncoderPins final : public ModulePins {
@@ -231,10 +280,12 @@ public:
             "samples per second of A, B and index",
             hal::PinOptions<std::uint32_t>{.initial = is_muxed ? 8'000'000U : 25'000'000U,
                                            .unit = "Hz"});
-        if (is_muxed) {
-            skew_ = std::make_unique<hal::In<double>>(o.component, o.write, "encoder.muxed-skew",
-                                                      "delay of the samples behind the multiplexer",
-                                                      hal::PinOptions<double>{.unit = "ns"});
+        const unsigned version = module.descriptor.version & ~unsigned{encoder::version_with_probe};
+        if (is_muxed && version >= encoder::version_with_skew) {
+            skew_ = std::make_unique<hal::In<std::uint32_t>>(
+                o.component, o.write, "encoder.muxed-skew",
+                "delay of the samples behind the multiplexer, at most 15 clocks of the card",
+                hal::PinOptions<std::uint32_t>{.unit = "ns"});
         }
         if (has_dpll) {
             timer_.emplace(o, "encoder.timer-number",
@@ -262,8 +313,7 @@ public:
         out.put(divider_, divider());
         std::uint32_t filter = encoder_filter(*frequency_, clock_hz_);
         if (skew_) {
-            const double clocks = *skew_ * 1e-9 * clock_hz_;
-            filter |= static_cast<std::uint32_t>(clocks > 0.0 ? std::min(clocks, 15.0) : 0.0) << 28;
+            filter |= encoder_skew(*skew_, clock_hz_) << encoder::skew_shift;
         }
         out.put(filter_, filter);
         if (timer_) {
@@ -291,7 +341,7 @@ private:
     std::vector<std::unique_ptr<Encoder>> units_;
     hal::In<bool> hires_;
     std::unique_ptr<hal::In<std::uint32_t>> frequency_;
-    std::unique_ptr<hal::In<double>> skew_;
+    std::unique_ptr<hal::In<std::uint32_t>> skew_;
     std::optional<LatchTimer> timer_;
     std::size_t now_ = 0;
     std::size_t counts_ = 0;

@@ -23,11 +23,12 @@ enum class Event : std::uint8_t {
     remote_lost,
     remote_online,
     hold_too_long,
+    module_unused,
 };
 
 struct EventRecord {
     Event event;
-    std::uint32_t unit = 0;  ///< step generator, encoder, remote device
+    std::uint32_t unit = 0;  ///< step generator, encoder, remote device, unused module
     std::int64_t value = 0;
 };
 
@@ -58,16 +59,20 @@ inline constexpr bus::EventRow<Event> event_rows[] = {
     {Event::hold_too_long, bus::Effect::none,
      "hold-cycles is {value} ms, longer than watchdog.timeout_ns: the watchdog of {card} bites "
      "before the card counts as lost; lower hold-cycles"},
+    {Event::module_unused, bus::Effect::none, "{card}: {module}"},
 };
 static_assert(bus::in_order(event_rows));
 
 /// Formats the events of a card. All functions but fault() are [setup].
 class EventTexts {
 public:
-    /// `card` names the card; `remotes` are the names of the devices on smart serial.
-    EventTexts(std::string card, std::vector<std::string> remotes, std::size_t subjects)
+    /// `card` names the card; `remotes` are the names of the devices on smart serial; `unused`
+    /// describes the modules that are not used.
+    EventTexts(std::string card, std::vector<std::string> remotes, std::vector<std::string> unused,
+               std::size_t subjects)
         : card_(std::move(card)),
           remotes_(std::move(remotes)),
+          unused_(std::move(unused)),
           faults_(event_rows, std::max(subjects, remotes_.size()),
                   [this](Event event, std::size_t unit, std::string_view name) {
                       return value_of(name, {event, static_cast<std::uint32_t>(unit), 0});
@@ -96,11 +101,13 @@ private:
         if (name == "remote") {
             return record.unit < remotes_.size() ? remotes_[record.unit] : "a remote device";
         }
+        if (name == "module") return record.unit < unused_.size() ? unused_[record.unit] : "";
         return {};
     }
 
     const std::string card_;
     const std::vector<std::string> remotes_;
+    const std::vector<std::string> unused_;
     bus::FaultTexts faults_;
 };
 

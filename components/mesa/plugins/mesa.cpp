@@ -47,5 +47,6 @@ without an answer the card is lost: `online` is FALSE, a fault is recorded, and 
 configured and runs within a few cycles. Where the motor may not have followed, `stepgen.NN.position-valid` is FALSE, and the step generator stands until its
 `enable` was FALSE. When the watchdog bites although the card is there, because a thread was too late, outputs stay off until `watchdog.has_bit` is set to FALSE.
 
-`clock=card` lets all threads follow the DPLL of the card. Not supported are SSI, BiSS, Fanuc and resolver inputs, UARTs, three-phase PWM and table-driven steps.
+`clock=card` lets all threads follow the DPLL of the card. Not supported are SSI, BiSS, Fanuc and resolver inputs, UARTs, RC PWM and table-driven steps; a firmware with such
+modules is accepted, and they are named when it is loaded.
 )")

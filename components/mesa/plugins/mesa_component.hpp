@@ -21,6 +21,7 @@
 #include "pwm_pins.hpp"
 #include "serial_pins.hpp"
 #include "stepgen_pins.hpp"
+#include "three_phase_pins.hpp"
 
 namespace hal::mesa {
 
@@ -37,8 +38,11 @@ struct MesaComponent : LoadedCard, hal::bus::BusComponent {
                 remote_faults_.emplace_back();
             }
         }
-        texts_ = std::make_unique<EventTexts>(image_.address + " (" + image_.card + ")",
-                                              std::move(remotes), image_.pins.size());
+        std::vector<std::string> unused = unused_modules(image_);
+        unused_modules_ = unused.size();
+        texts_ =
+            std::make_unique<EventTexts>(image_.address + " (" + image_.card + ")",
+                                         std::move(remotes), std::move(unused), image_.pins.size());
         reporter_ = std::make_unique<hal::Reporter<EventRecord>>(
             name_, [this](const EventRecord& record) { return texts_->line(record); }, 256,
             &EventTexts::subject);
@@ -63,6 +67,9 @@ struct MesaComponent : LoadedCard, hal::bus::BusComponent {
         was_lost_ = false;
         begin_cycles();
         reporter_->start();
+        for (std::uint32_t n = 0; n < unused_modules_; ++n) {
+            reporter_->tell({Event::module_unused, n});
+        }
     }
     void stop() noexcept {
         if (link_) {
@@ -207,6 +214,7 @@ private:
         case Tag::encoder:
         case Tag::muxed_encoder: encoders_ = add<EncoderPins>(owner, module, has_dpll); break;
         case Tag::pwm: add<PwmPins>(owner, module); break;
+        case Tag::three_phase_pwm: add<ThreePhasePins>(owner, module); break;
         case Tag::ssr: add<SsrPins>(owner, image_, module); break;
         case Tag::outm: add<OutmPins>(owner, image_, module); break;
         case Tag::led: add<LedPins>(owner, module); break;
@@ -579,6 +587,7 @@ private:
     std::unique_ptr<CycleLink> link_;
     CardMonitor monitor_;
     std::unique_ptr<EventTexts> texts_;
+    std::size_t unused_modules_ = 0;
     std::unique_ptr<hal::Reporter<EventRecord>> reporter_;
     hal::LastingFault link_fault_, position_fault_;
     std::vector<hal::LastingFault> remote_faults_;

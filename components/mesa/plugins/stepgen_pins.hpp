@@ -15,12 +15,76 @@
 #include "latch_timer.hpp"
 #include "mesa/driver/position_counter.hpp"
 #include "mesa/driver/step_control.hpp"
+#include "mesa/driver/step_latch.hpp"
 #include "mesa/hostmot2/formulas.hpp"
 #include "mesa/hostmot2/registers.hpp"
 #include "module_pins.hpp"
 #include "scale_param.hpp"
 
 namespace hal::mesa {
+
+/// Index and probe of a step generator, of firmware that latches its position.
+class StepgenLatch {
+public:
+    StepgenLatch(const PinOwner& o, unsigned unit)
+        : position_latch_(o.component, o.read, named(unit, "position-latch"),
+                          "position at the newest index or probe event"),
+          index_enable_(o.component, named(unit, "index-enable"),
+                        "TRUE: the next index makes the position 0 and this FALSE"),
+          probe_enable_(o.component, named(unit, "probe-enable"),
+                        "TRUE: the next event of the probe sets position-latch, and this to FALSE; "
+                        "index-enable goes first"),
+          index_invert_(o.component, o.write, named(unit, "index-invert"),
+                        "TRUE: the rising edge of the index counts"),
+          probe_invert_(o.component, o.write, named(unit, "probe-invert"),
+                        "TRUE: the rising edge of the probe counts") {}
+
+    /// `mode`: its register. Returns the event of an answer. [realtime] read
+    LatchSource receive(std::uint32_t mode, const Reading& reading) noexcept {
+        const bool begins_anew = reading.has_lost_power || reading.is_after_reset;
+        return latch_.receive(mode, reading.writes_arrived, begins_anew);
+    }
+    /// [realtime] read
+    void miss() noexcept { latch_.miss(); }
+    /// Returns the accumulator at the event. [realtime] read
+    std::int32_t accumulator() const noexcept {
+        return static_cast<std::int32_t>(latch_.latched());
+    }
+    /// [realtime] read
+    void show(LatchSource source, double position) noexcept {
+        position_latch_ = position;
+        if (source == LatchSource::index) {
+            index_enable_ = false;
+        } else {
+            probe_enable_ = false;
+        }
+    }
+    /// `mode`: the bits that are not those of the latch. [realtime] write
+    void transmit(Outgoing& out, std::uint16_t address, std::uint32_t mode) noexcept {
+        mode |= index_invert_ ? stepgen::index_polarity : 0;
+        mode |= probe_invert_ ? stepgen::probe_polarity : 0;
+        const auto value = latch_.transmit(mode, wanted());
+        if (!value) return;
+        out.put(address, *value);
+        if (!out.is_complete()) {
+            latch_.miss();
+        }
+    }
+
+private:
+    static const char* named(unsigned unit, const char* name) {
+        return brief_name("stepgen.%02u.%s", unit, name);
+    }
+    LatchSource wanted() const noexcept {
+        if (index_enable_) return LatchSource::index;
+        return probe_enable_ ? LatchSource::probe : LatchSource::none;
+    }
+
+    StepLatch latch_;
+    hal::Out<double> position_latch_;
+    hal::Io<bool> index_enable_, probe_enable_;
+    hal::In<bool> index_invert_, probe_invert_;
+};
 
 /// One step generator. The card turns the last rate into steps until it gets another one, so between
 /// two readings the position is known as well:
@@ -83,6 +147,15 @@ public:
                             "position error when the velocities match"),
           dbg_step_rate_(o.component, o.write, named(unit, "dbg_step_rate"), "rate",
                          {.unit = "steps/s"}) {
+        const std::uint8_t version = module.descriptor.version;
+        if (version == stepgen::version_with_latch) {
+            latch_ = std::make_unique<StepgenLatch>(o, unit);
+        }
+        if (version == stepgen::version_with_latch || version == stepgen::version_with_swap) {
+            swap_step_dir_ = std::make_unique<hal::Param<bool>>(
+                o.component, named(unit, "swap_step_dir"),
+                "TRUE: the pins of step and direction are exchanged");
+        }
         // one at a time: a name lasts until the next one
         hal::Retained(o.component, {{named(unit, "counter"), counter_}});
         hal::Retained(o.component, {{named(unit, "zero"), zero_}});
@@ -91,7 +164,7 @@ public:
     }
 
     /// [realtime] read
-    void receive(std::uint32_t accumulator, const Reading& reading) noexcept {
+    void receive(std::uint32_t accumulator, std::uint32_t mode, const Reading& reading) noexcept {
         if (!has_begun_ && has_run_) {
             lose_position();  // a reload: whether the motor stood meanwhile is unknown
         }
@@ -121,11 +194,17 @@ public:
             }
         }
         stopped_rate_ = 0;
+        if (latch_) {
+            follow_latch(value, latch_->receive(mode, reading));
+        }
         show();
     }
     /// [realtime] read
     void miss(double period_s) noexcept {
         moved_ += rate_per_s() * period_s;
+        if (latch_) {
+            latch_->miss();
+        }
         show();
     }
     /// The card is lost: from here on its motor stops at an unknown time. [realtime] read
@@ -160,7 +239,11 @@ public:
         out.put(space_, step_time(stepspace_, clock_hz_));
         out.put(setup_, step_time(dirsetup_, clock_hz_));
         out.put(hold_, step_time(dirhold_, clock_hz_));
-        out.put(mode_, std::min<std::uint32_t>(step_type_, 2));
+        if (latch_) {
+            latch_->transmit(out, mode_.address(), mode());
+        } else {
+            out.put(mode_, mode());
+        }
         out.put(rate_address_, static_cast<std::uint32_t>(rate_));
         if (std::abs(std::int64_t{rate_}) > std::abs(std::int64_t{possible_rate_})) {
             possible_rate_ = rate_;
@@ -196,9 +279,11 @@ private:
     double rate_per_s() const noexcept {
         return steps_per_s(rate_, clock_hz_) * accumulator_per_step;
     }
-    double position() const noexcept {
-        const double whole = static_cast<double>(counter_.position() - zero_);
-        return (whole + lost_ + moved_) / accumulator_per_step / scale();
+    double position() const noexcept { return position_at(counter_.position(), moved_); }
+    /// Returns the position at a count of the accumulator, and `beyond` behind it.
+    double position_at(std::int64_t count, double beyond) const noexcept {
+        const double whole = static_cast<double>(count - zero_);
+        return (whole + lost_ + beyond) / accumulator_per_step / scale();
     }
     double max_velocity() const noexcept {
         const double clocks =
@@ -206,6 +291,25 @@ private:
         const double hardware = clock_hz_ / clocks / std::abs(scale());
         const double wanted = std::abs(maxvel_.get());
         return wanted > 0.0 && wanted < hardware ? wanted : hardware;
+    }
+
+    std::uint32_t mode() const noexcept {
+        const std::uint32_t type = std::min<std::uint32_t>(step_type_, 2);
+        return swap_step_dir_ && *swap_step_dir_ ? type | stepgen::swap_step_direction : type;
+    }
+    /// `value`: the accumulator of the answer that shows the event.
+    void follow_latch(std::int32_t value, LatchSource source) noexcept {
+        if (source == LatchSource::none) return;
+        const auto since = static_cast<std::int32_t>(
+            static_cast<std::uint32_t>(value) - static_cast<std::uint32_t>(latch_->accumulator()));
+        const std::int64_t count = counter_.position() - since;
+        const double at = position_at(count, 0.0);
+        latch_->show(source, at);
+        if (source == LatchSource::index) {
+            zero_ = count;
+            lost_ = 0.0;
+            control_.move_origin(at);
+        }
     }
 
     /// Where the outputs were switched off and the rate 0 has not arrived, the motor has stopped, and
@@ -280,6 +384,8 @@ private:
     ScaleParam position_scale_;
     hal::OptionalLimitParam maxvel_, maxaccel_;
     hal::Param<std::uint32_t> steplen_, stepspace_, dirsetup_, dirhold_, step_type_;
+    std::unique_ptr<hal::Param<bool>> swap_step_dir_;  ///< of firmware that can
+    std::unique_ptr<StepgenLatch> latch_;  ///< the same
     hal::Out<double> dbg_pos_minus_prev_cmd_, dbg_ff_vel_, dbg_vel_error_, dbg_s_to_match_,
         dbg_err_at_match_, dbg_step_rate_;
 };
@@ -290,6 +396,7 @@ public:
     StepgenPins(const PinOwner& o, const CardModule& module, const DpllPins* dpll)
         : addresses_(module.addresses),
           dpll_(dpll),
+          has_latches_(module.descriptor.version == stepgen::version_with_latch),
           units_(make_units<Stepgen>(o, module)),
           master_rate_(module.addresses.at(stepgen::master_rate)) {
         if (dpll_ != nullptr) {
@@ -303,6 +410,9 @@ public:
         if (!units_.empty()) {
             accumulators_ = layout.add_instances(addresses_, stepgen::accumulator, units_.size());
         }
+        if (has_latches_) {
+            modes_ = layout.add_instances(addresses_, stepgen::mode, units_.size());
+        }
     }
     void receive(const Reply& reply, const Reading& reading) noexcept override {
         Reading own = reading;
@@ -310,7 +420,8 @@ public:
             own.age_s += dpll_->latched_before_s(timer_->number(), reading.period_s);
         }
         for (std::size_t n = 0; n < units_.size(); ++n) {
-            units_[n]->receive(reply.word(accumulators_, n), own);
+            const std::uint32_t mode = has_latches_ ? reply.word(modes_, n) : 0;
+            units_[n]->receive(reply.word(accumulators_, n), mode, own);
         }
     }
     void miss(double period_s) noexcept override {
@@ -368,10 +479,12 @@ public:
 private:
     const ModuleAddresses addresses_;
     const DpllPins* const dpll_;
+    const bool has_latches_;
     std::vector<std::unique_ptr<Stepgen>> units_;
     Setting master_rate_;
     std::optional<LatchTimer> timer_;
     std::size_t accumulators_ = 0;
+    std::size_t modes_ = 0;
 };
 
 }  // namespace hal::mesa

@@ -16,12 +16,15 @@ TEST(Reference, Page_has_the_events_of_the_driver) {
 }
 
 TEST(EventTexts, Name_the_card_the_unit_and_the_reaction) {
-    const EventTexts texts("eth:10.10.10.10 (7I92)", {"the device 7i76.0.1"}, 3);
+    const EventTexts texts("eth:10.10.10.10 (7I92)", {"the device 7i76.0.1"},
+                           {"unknown module (tag 0x77) is not used"}, 3);
     EXPECT_EQ(texts.line({Event::lost, 0, 5}),
               "the card eth:10.10.10.10 (7I92) is lost: no answer in 5 cycles; check its power and "
               "its cable");
     EXPECT_EQ(texts.line({Event::remote_lost, 0, 0}),
               "the device 7i76.0.1 does not answer; check its cable and its field power");
+    EXPECT_EQ(texts.line({Event::module_unused, 0, 0}),
+              "the card eth:10.10.10.10 (7I92): unknown module (tag 0x77) is not used");
     ASSERT_NE(texts.fault({Event::position_lost, 2, 0}), nullptr);
     EXPECT_EQ(texts.fault({Event::position_lost, 2, 0})->text,
               "stepgen 02 has lost its position: its motor may not have followed its steps; it "

@@ -54,9 +54,10 @@ TEST(ConfigString, Names_what_is_wrong) {
               "num_pwmgens=N, sserial_port_0=MODES and their like; see: hal doc mesa");
     EXPECT_EQ(problem_of("num_stepgens=x"),
               "invalid number 'x' of num_stepgens; write how many are used, or -1 for all");
-    EXPECT_EQ(problem_of("num_pktuarts=2"),
-              "num_pktuarts=2: this driver does not support the module; LinuxCNC's driver does: "
+    EXPECT_EQ(problem_of("num_oneshots=2"),
+              "num_oneshots=2: this driver does not support the module; LinuxCNC's driver does: "
               "loadrt --linuxcnc hm2_eth");
+    EXPECT_EQ(problem_of("num_pktuarts=2 num_uarts=1 num_3pwmgens=1"), "");
     EXPECT_EQ(
         problem_of("sserial_port_0=0y"),
         "invalid modes '0y' of sserial_port_0; write up to 8 characters, a digit for the mode "
@@ -131,7 +132,7 @@ TEST_F(ProbeTest, Names_what_is_wrong_with_a_firmware) {
     card.store_tables();
     EXPECT_EQ(probe_problem(),
               "sim:card (7I76E-16): module stepgen of the firmware has version 9; the driver "
-              "supports 0, 1, 2, 66, 194");
+              "supports 0, 1, 2, 0x42, 0xC2");
     card.modules[2].version = 2;
     card.modules[2].registers = 4;
     card.store_tables();
@@ -147,6 +148,76 @@ TEST_F(ProbeTest, Names_what_is_wrong_with_a_firmware) {
     card.store_tables();
     EXPECT_EQ(probe_problem(),
               "sim:card (7I76E-16): unknown firmware: it has no I/O ports or no watchdog");
+}
+
+TEST_F(ProbeTest, Names_the_versions_of_encoders) {
+    card.modules.push_back({Tag::muxed_encoder, 0x85, ClockTag::low, 6, 0x3500, 5, 0x00, 0x3});
+    card.store_tables();
+    EXPECT_EQ(probe_problem(),
+              "sim:card (7I76E-16): module muxed encoder of the firmware has version 0x85; the "
+              "driver supports 2, 3, 4, 0x84");
+    card.modules.back().version = 4;
+    card.modules.push_back({Tag::encoder, 3, ClockTag::low, 2, 0x3000, 5, 0x00, 0x3});
+    card.store_tables();
+    EXPECT_EQ(probe_problem(),
+              "sim:card (7I76E-16): the firmware has the modules muxed encoder and encoder; the "
+              "driver supports one of this kind");
+}
+
+TEST_F(ProbeTest, Leaves_the_pins_of_modules_without_a_driver_as_GPIO) {
+    card.modules.push_back({Tag{0xc0}, 1, ClockTag::low, 6, 0xc000, 5, 0x00, 0x1f});
+    card.modules.push_back({Tag{0x77}, 0xc1, ClockTag::low, 1, 0xd000, 5, 0x00, 0x1f});
+    card.idrom.instance_strides[1] = 0x10;
+    card.modules.push_back({Tag::uart_transmit, 0, ClockTag::low, 2, 0x6000, 4, 0x10, 0x0f});
+    card.modules.push_back({Tag::packet_uart_receive, 3, ClockTag::low, 1, 0x6500, 4, 0x00, 0x0f});
+    card.store_tables();
+    card.put_pin(20, {1, true, Tag{0xc0}, 0});
+    card.put_pin(21, {1, true, Tag{0x77}, 0});
+    card.put_pin(22, {1, true, Tag::uart_transmit, 0});
+    SetupLink link(*opened.port);
+    CardImage image = probe(link);
+    ConfigString config;
+    config.parse("num_uarts=2");
+    EXPECT_EQ(apply(config, image), "");
+    EXPECT_TRUE(image.pins[20].is_gpio);
+    EXPECT_TRUE(image.pins[21].is_gpio);
+    EXPECT_TRUE(image.pins[22].is_gpio);
+    const std::vector<std::string> expected = {
+        "module resolver (tag 0xC0, version 1, 6 instances) is not supported; its I/O pins are "
+        "GPIO",
+        "unknown module (tag 0x77, version 0xC1, 1 instance) is not used; its I/O pins are GPIO",
+        "module UART transmit (tag 0x09, version 0, 2 instances) is not used: UARTs have no pins "
+        "in HAL; its I/O pins are GPIO",
+        "module packet UART receive (tag 0x1C, version 3, 1 instance) is not used: UARTs have no "
+        "pins in HAL; its I/O pins are GPIO"};
+    EXPECT_EQ(unused_modules(image), expected);
+    config.parse("num_uarts=3");
+    EXPECT_EQ(apply(config, image),
+              "sim:card (7I76E-16): config asks for num_uarts=3, but the firmware has 2; without "
+              "num_uarts all of them are used");
+}
+
+/// The multiplexer puts two encoders on the pins of a unit.
+TEST_F(ProbeTest, Uses_the_pins_of_half_as_many_units_as_multiplexed_encoders) {
+    card.modules.push_back({Tag::muxed_encoder, 4, ClockTag::low, 6, 0x3500, 5, 0x00, 0x3});
+    card.store_tables();
+    for (std::uint8_t unit = 0; unit < 3; ++unit) {
+        card.put_pin(20U + unit, {pin_number::encoder::a, false, Tag::muxed_encoder, unit});
+    }
+    card.put_pin(23, {1, true, Tag::mux_select, PinDescriptor::all_units});
+    SetupLink link(*opened.port);
+    CardImage image = probe(link);
+    ConfigString config;
+    config.parse("num_encoders=3");
+    EXPECT_EQ(apply(config, image), "");
+    EXPECT_FALSE(image.pins[20].is_gpio);
+    EXPECT_FALSE(image.pins[21].is_gpio);
+    EXPECT_TRUE(image.pins[22].is_gpio);
+    EXPECT_FALSE(image.pins[23].is_gpio);
+    config.parse("num_encoders=0");
+    EXPECT_EQ(apply(config, image), "");
+    EXPECT_TRUE(image.pins[20].is_gpio);
+    EXPECT_TRUE(image.pins[23].is_gpio);
 }
 
 TEST_F(ProbeTest, Rejects_more_pins_and_instances_than_a_register_has_bits) {

@@ -103,6 +103,9 @@ TEST(Module, Known_modules_are_compared_with_what_a_driver_can_use) {
     EXPECT_EQ(fault_of(bad, kind, rom), ModuleFault::outside);
     EXPECT_EQ(kind_of(Tag{0x77}), nullptr);
     EXPECT_EQ(name_of(Tag::dpll), "dpll");
+    EXPECT_EQ(name_of(Tag{0xc0}), "resolver");
+    EXPECT_EQ(kind_of(Tag{0xc0}), nullptr);
+    EXPECT_EQ(name_of(Tag{0x77}), "?");
 }
 
 TEST(Pin, Word_has_its_fields_and_comes_back) {
@@ -124,6 +127,8 @@ TEST(Pin, Functions_have_the_names_of_their_modules) {
     EXPECT_EQ(function_of(PinDescriptor::decode(0x0300c18b)), "sserial.00.txen0");
     EXPECT_EQ(function_of(PinDescriptor::decode(0x0300c301 | 0x80)), "ssr.00.out-00");
     EXPECT_EQ(function_of(PinDescriptor::decode(0x03800d81)), "mux.select-0");
+    EXPECT_EQ(function_of(PinDescriptor::decode(0x03001386)), "3pwmgen.00.phase-C-inverted");
+    EXPECT_EQ(function_of(PinDescriptor::decode(0x03011308)), "3pwmgen.01.fault");
     EXPECT_EQ(function_of(PinDescriptor::decode(0x03007701)), "module-0x77.00");
     EXPECT_EQ(function_of(PinDescriptor::decode(0x03000000)), "");
 }
@@ -223,6 +228,28 @@ TEST(SmartSerial, Outputs_of_a_7i76_are_packed_from_the_lowest_bit) {
     EXPECT_EQ(words[1], 0x3fU);
     smart_serial::put_bits(words, 60, 10, 0x3ff);
     EXPECT_EQ(smart_serial::take_bits(words, 60, 10), 0xfU);
+}
+
+TEST(Formulas, Three_phases_have_ten_bits_each_around_the_middle) {
+    EXPECT_EQ(three_phase_value(0.0, 0.0, 0.0), 512U << 20 | 512U << 10 | 512U);
+    EXPECT_EQ(three_phase_value(1.0, -1.0, 5.0), 1023U << 20 | 1U << 10 | 1023U);
+    EXPECT_EQ(three_phase_value(std::nan(""), 0.0, 0.0) & 0x3ffU, 512U);
+    EXPECT_DOUBLE_EQ(three_phase_duty(three_phase_value(1.0, -1.0, 0.0), 1), -1.0);
+    EXPECT_EQ(three_phase_rate(20'000.0, low), 26843U);
+    EXPECT_EQ(three_phase_rate(1e6, low), 65535U);
+    // 2 x 65536 / (100 MHz x 26843) is 48.83 ns
+    EXPECT_EQ(three_phase_dead_time(5000.0, 26843, low), 102U);
+    EXPECT_EQ(three_phase_dead_time(1e6, 26843, low), 511U);
+    EXPECT_EQ(three_phase_dead_time(-1.0, 0, low), 0U);
+    EXPECT_EQ(three_phase_sample(0.5), 511U);
+    EXPECT_EQ(three_phase_sample(2.0), 1023U);
+}
+
+TEST(Formulas, Skew_of_multiplexed_encoders_is_rounded_to_clocks) {
+    EXPECT_EQ(encoder_skew(0.0, low), 0U);
+    EXPECT_EQ(encoder_skew(44.0, low), 4U);
+    EXPECT_EQ(encoder_skew(45.0, low), 5U);
+    EXPECT_EQ(encoder_skew(1000.0, low), 15U);
 }
 
 }  // namespace

@@ -50,6 +50,9 @@ public:
                 PinDescriptor{}.encode());
         }
     }
+    void put_pin(std::size_t pin, const PinDescriptor& descriptor) {
+        put(Space::hostmot2, usual_idrom_address + idrom.pins + 4 * pin, descriptor.encode());
+    }
     template <class T>
     void put(Space space, std::size_t address, T value) {
         store(at(space, address), value);

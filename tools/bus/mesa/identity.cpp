@@ -107,14 +107,17 @@ std::string info_text(const std::string& host, const CardIdentity& card) {
     for (const ModuleDescriptor& module : card.modules) {
         const ModuleKind* const kind = kind_of(module.tag);
         std::string remark;
-        if (kind == nullptr) {
+        const std::string_view known_name = name_of(module.tag);
+        if (known_name == "?") {
             remark = "unknown";
+        } else if (kind == nullptr) {
+            remark = "not supported";
         } else if (fault_of(module, *kind, card.idrom) != ModuleFault::none) {
             remark = "not as drivers know it";
         }
-        const std::string name = kind == nullptr
+        const std::string name = known_name == "?"
                                      ? fmt::format("0x{:02X}", static_cast<unsigned>(module.tag))
-                                     : std::string(kind->name);
+                                     : std::string(known_name);
         std::string line =
             fmt::format("{:22}  {:>5}  {:>7}  {:>9}  0x{:04X}  {}", name, module.instances,
                         module.version, module.registers, module.base, remark);
