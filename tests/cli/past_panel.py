@@ -36,8 +36,8 @@ def wait_for_cycles(case, count):
     )
 
 
-def journal_incident(case, *options):
-    """Writes run.mcap: a machine whose station is lost, and that is stopped and started."""
+def journal_incident(case, *options, edits=0):
+    """Writes run.mcap: a machine that is edited so often, whose station is lost, and that is stopped and started."""
     case.write("bus.canopen", BUS)
     machine = case.start("run", case.write("m.hal", INCIDENT), "--journal", "run.mcap", *options)
     wait_until(
@@ -45,6 +45,8 @@ def journal_incident(case, *options):
         "the station is operational",
     )
     wait_for_cycles(case, 300)
+    if edits > 0:
+        case.good("shell", given="".join(f"setp smooth.gain {i}e-5\n" for i in range(edits)))
     case.good("shell", "setp", "canopen-io.0.power", "FALSE")
     wait_until(
         lambda: case.shell("getp", "canopen.0.io.online").stdout.strip() == "FALSE",
@@ -57,6 +59,30 @@ def journal_incident(case, *options):
     wait_for_cycles(case, 100)
     case.good("shell", "start")
     wait_for_cycles(case, 100)
+    case.end(machine)
+    case.assertEqual(0, machine.returncode)
+
+
+# A machine whose instances change while it runs.
+EDITED = """loadrt threads name1=servo period1=1000000
+loadrt siggen names=wave
+addf wave.update servo
+net sine wave.sine
+start
+"""
+
+
+def journal_edits(case):
+    """Writes run.mcap: an instance is loaded, a second one is loaded and unloaded."""
+    machine = case.start("run", case.write("m.hal", EDITED), "--journal", "run.mcap")
+    wait_for_cycles(case, 200)
+    for lines in (
+        ["loadrt not names=late", "addf late servo", "net later late.out"],
+        ["loadrt sum2 names=short", "addf short servo"],
+        ["unloadrt short"],
+    ):
+        case.good("shell", given="\n".join(lines) + "\n")
+        wait_for_cycles(case, 100)
     case.end(machine)
     case.assertEqual(0, machine.returncode)
 

@@ -3,14 +3,18 @@
 # packages: canopen panel
 """The control socket and the panel of a replayed machine: hal replay --exact FILE --panel, without a browser."""
 
+import contextlib
 import csv
+import os
+import pathlib
 import random
+import re
 import struct
 import sys
 import unittest
 
 from harness import SANITIZED, SERVO, Case, wait_until
-from past_panel import Client, journal_incident, start_past, wait_for_cycles
+from past_panel import Client, journal_edits, journal_incident, start_past, wait_for_cycles
 from web import PANEL, WebSocket
 
 SHOWN = ["show pin canopen", "show pin smooth", "show sig", "show thread", "show fault"]
@@ -32,6 +36,16 @@ class ReplayPanel(Case):
             "replay", "--exact", "run.mcap", "--shell", given="\n".join(lines) + "\n"
         )
         return done.stdout
+
+    def processes_of(self, leader):
+        """What runs in the sessions of tests beside this program: processes with the folder of the test."""
+        found = []
+        for path in pathlib.Path("/proc").glob("[0-9]*"):
+            with contextlib.suppress(OSError):
+                is_here = os.readlink(path / "cwd") == str(self.folder.resolve())
+                if is_here and int(path.name) not in (leader, os.getpid()):
+                    found.append((path / "comm").read_text().strip())
+        return found
 
     def marks(self, timeline, kind):
         return [mark for mark in timeline["timeline"]["marks"] if mark["kind"] == kind]
@@ -106,6 +120,62 @@ class ReplayPanel(Case):
             client.run("break", "sine", "=>"),
         )
 
+    def test_a_step_back_passes_edits_that_execute_several_cycles(self):
+        journal_edits(self)
+        timeline = self.begin()
+        edits = self.marks(timeline, "edit")
+        self.assertEqual(6, len(edits))
+        shell = ["step back"] * 12
+        for edit in edits:
+            self.client.run("goto", f"{edit['time_ns'] + 2_000_000}ns")
+            cycles = [self.client.ask(moment=True)["moment"]["cycles"]]
+            for _ in range(12):
+                self.assertEqual(0, self.client.run("step", "back")[0])
+                cycles.append(self.client.ask(moment=True)["moment"]["cycles"])
+            self.assertTrue(all(b < a for a, b in zip(cycles, cycles[1:])), cycles)
+            self.client.run("goto", f"{edit['time_ns']}ns")
+            self.client.run("step", "back", "1", "servo")
+            self.assertLess(self.client.ask(moment=True)["moment"]["cycles"], edit["cycles"])
+            text = self.shell_in_the_past([f"goto {edit['time_ns'] + 2_000_000}ns", *shell])
+            numbers = [int(number) for number in re.findall(r"(?m)^cycle (\d+) of 'servo'", text)]
+            self.assertEqual(13, len(numbers), text)
+            self.assertTrue(all(b < a for a, b in zip(numbers, numbers[1:])), numbers)
+        count = self.client.ask(moment=True)["moment"]["edits"]
+        self.client.run("goto", f"{edits[0]['time_ns'] - 20_000_000}ns")
+        self.assertLess(self.client.ask(moment=True)["moment"]["edits"], count)
+        self.client.run("step", str(2**64 - 1))
+        self.assertTrue(self.client.ask(moment=True)["moment"]["ended"])
+
+    def test_moves_to_faults_begin_where_the_move_before_has_ended(self):
+        journal_incident(self)
+        (fault,) = self.marks(self.begin(), "fault")
+        moves = [["goto", "0s"], ["fault", "next"], ["goto", "1"], ["fault", "previous"]]
+        replies = self.client.ask_at_once({"run": move} for move in moves)
+        self.assertEqual([0, 0, 0, 1], [reply["status"] for reply in replies])
+        self.assertIn(f"at {fault['time_ns'] / 1e9:.6f} s", replies[1]["out"])
+        self.assertEqual("no earlier fault\n", replies[3]["err"])
+
+    def test_a_client_that_asks_where_the_machine_is_interrupts_nothing(self):
+        journal_incident(self)
+        start_past(self, "--until", "400")
+        client = Client(self)
+        # the first execution of the journal has begun, or --until waits
+        client.run("where")
+        client.run("break", "sine", ">", "5")
+        while (moment := client.ask(moment=True)["moment"]).get("fastest_cycle") != 400:
+            client.run("where")
+        self.assertTrue(moment["frontier"] > moment["cycles"])
+
+    def test_of_very_many_marks_no_fault_is_left_out(self):
+        journal_incident(self, edits=10_100)
+        timeline = self.begin()["timeline"]
+        (fault,) = [mark for mark in timeline["marks"] if mark["kind"] == "fault"]
+        self.assertEqual(10_001, len(timeline["marks"]))
+        self.assertLess(100, self.moment["left_out"])
+        self.client.run("goto", "0s")
+        self.assertEqual(0, self.client.run("fault", "next")[0])
+        self.assertEqual(fault["cycles"], self.client.ask(moment=True)["moment"]["cycles"])
+
     def test_of_many_gotos_the_newest_is_executed(self):
         journal_incident(self)
         self.begin()
@@ -157,6 +227,31 @@ class ReplayPanel(Case):
         unknown = self.client.ask(around=["sine", "nothing"])
         self.assertIn("nothing", unknown["error"])
 
+    def test_rows_of_a_value_begin_when_it_is_loaded(self):
+        journal_edits(self)
+        loaded = self.marks(self.begin(), "edit")[2]
+        self.client.run("goto", f"{loaded['time_ns'] + 30_000_000}ns")
+        number = self.client.send(around=["late.out", "sine"], before_ms=80, after_ms=10)
+        reply = self.client.reply(number)
+        samples = self.client.event(lambda one: one.get("event") == "samples")
+        self.assertEqual(["bit", "float"], [one["type"] for one in reply["columns"]])
+        rows = {}
+        at = 0
+        for part in samples["parts"]:
+            (column,) = reply["groups"][part["group"]]["columns"]
+            form = "<qqq" if column == 0 else "<qqd"
+            rows[column] = [
+                struct.unpack_from(form, samples["rows"], at + 24 * i) for i in range(part["rows"])
+            ]
+            at += 24 * part["rows"]
+        self.assertEqual(len(samples["rows"]), at)
+        self.assertLessEqual({value for _, _, value in rows[0]}, {0, 1})
+        self.assertIn(1, {value for _, _, value in rows[0]})
+        self.assertTrue(all(-1 <= value <= 1 for _, _, value in rows[1]))
+        begin_ns = loaded["time_ns"] - 50_000_000
+        self.assertLess(abs(rows[1][0][1] - begin_ns), 5_000_000)
+        self.assertGreater(rows[0][0][1], loaded["time_ns"] - 20_000_000)
+
     def test_the_past_cannot_be_changed(self):
         journal_incident(self)
         self.begin()
@@ -192,6 +287,15 @@ class ReplayPanel(Case):
         self.assertIn("cannot be acknowledged", self.client.run("fault", "clear")[1])
         self.assertEqual({**before, "id": 0}, {**self.client.ask(describe="all"), "id": 0})
         self.assertFalse(self.client.ask(wish="sine")["ok"])
+        for request, problem in (
+            ({"options": {"json": "yes"}}, "json must be true or false"),
+            ({"options": 1}, "options must be an object"),
+            ({"subscribe": [1]}, "subscribe must be an array of names"),
+            ({"unsubscribe": "a"}, "unknown subscription"),
+            ({"around": {"sine": 1}}, "around must be an array of names"),
+            ({"run": {"step": 1}}, "run requires a command: a line, or its words"),
+        ):
+            self.assertEqual(problem, self.client.ask(**request)["error"])
         self.client.socket.sendall(b"no json\n")
         self.assertFalse(self.client.reply(None)["ok"])
 
@@ -250,6 +354,30 @@ class ReplayPanel(Case):
             self.assertEqual((cycle, False), (moment["fastest_cycle"], moment["copied"]))
             self.assertGreater(moment["took_ms"], 0)
 
+    def test_no_process_remains_when_it_is_killed(self):
+        journal_incident(self)
+        self.begin()
+        self.assertIn("hal-panel", self.processes_of(self.process.pid))
+        self.process.kill()
+        self.process.wait()
+        wait_until(lambda: self.processes_of(self.process.pid) == [], "all its processes end")
+
+    def test_a_moment_that_is_not_reached_again_is_left(self):
+        self.write("number.txt", "5\n")
+        netlist = SERVO + "loadrt gauge file=number.txt\naddf gauge.0 servo\n"
+        machine = self.start("run", self.write("a.hal", netlist), "--journal", "run.mcap")
+        wait_for_cycles(self, 200)
+        self.end(machine)
+        self.begin("--anyway")
+        self.assertEqual("the journal has no further cycle\n", self.moment["state"])
+        # the machine reads it again when it is executed from the begin
+        self.write("number.txt", "7\n")
+        self.client.ask(around=["gauge.0.out"])
+        self.assertEqual([7], self.client.ask(read=["gauge.0.out"])["values"])
+        moment = self.client.ask(moment=True)["moment"]
+        self.assertIn("first difference: cycle", moment["state"])
+        self.assertLess(moment["cycles"], self.moment["cycles"])
+
     def test_it_begins_at_the_given_moment_and_ends_with_its_panel(self):
         journal_incident(self)
         self.process, self.port = start_past(self, "--break", "canopen-io.0.power < 0.5")
@@ -276,6 +404,7 @@ class ReplayPanel(Case):
         self.assertTrue(client.ask(stop=True)["ok"])
         self.process.wait(10)
         self.assertEqual(0, self.process.returncode)
+        self.assertEqual([], self.processes_of(self.process.pid))
         for words, problem in (
             (["--shell", "--panel"], "--panel excludes --shell"),
             (["--panel", "--record", "x.csv"], "--panel excludes --shell"),

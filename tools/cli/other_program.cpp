@@ -8,6 +8,7 @@
 #include <fmt/core.h>
 #include <spawn.h>
 #include <string_view>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 #include <utility>
@@ -78,6 +79,22 @@ int spawn_with_default_signals(pid_t& child, const std::string& program, char** 
     return error;
 }
 
+/// Starts a program as spawn_with_default_signals() does; it gets SIGTERM when this one has ended, also
+/// when it was killed. Returns its process, or -1 with errno.
+pid_t spawn_companion(const char* name, const std::string& program, char** argv) {
+    const pid_t parent = ::getpid();
+    const pid_t child = ::fork();
+    if (child != 0) return child;
+    ::prctl(PR_SET_PDEATHSIG, SIGTERM);
+    if (::getppid() != parent) ::_exit(1);  // it has ended before that
+    sigset_t blocked;
+    ::sigemptyset(&blocked);
+    ::sigprocmask(SIG_SETMASK, &blocked, nullptr);
+    std::signal(SIGINT, SIG_DFL);
+    ::execv(program.c_str(), argv);
+    ::_exit(report_missing(name, errno));
+}
+
 }  // namespace
 
 int become_program(const char* name, char** argv) {
@@ -92,7 +109,7 @@ int become_program(const char* name, char** argv) {
     return report_missing(name, errno);
 }
 
-pid_t start_program(const char* name, std::vector<std::string> arguments) {
+pid_t start_program(const char* name, std::vector<std::string> arguments, Lifetime lifetime) {
     const std::string program = path_of(name);
     if (::access(program.c_str(), X_OK) != 0) {
         build_on_demand(build_name(name));
@@ -104,7 +121,13 @@ pid_t start_program(const char* name, std::vector<std::string> arguments) {
     }
     argv.push_back(nullptr);
     pid_t child = 0;
-    const int error = spawn_with_default_signals(child, program, argv.data());
+    int error = 0;
+    if (lifetime == Lifetime::of_this) {
+        child = spawn_companion(name, program, argv.data());
+        error = child < 0 ? errno : 0;
+    } else {
+        error = spawn_with_default_signals(child, program, argv.data());
+    }
     if (error == 0) return child;
     report_missing(name, error);
     return -1;
@@ -113,7 +136,7 @@ pid_t start_program(const char* name, std::vector<std::string> arguments) {
 int run_tool(std::vector<std::string> arguments) {
     constexpr const char* name = "hal-tools";
     const IgnoredInterrupt meanwhile;
-    const pid_t child = start_program(name, std::move(arguments));
+    const pid_t child = start_program(name, std::move(arguments), Lifetime::own);
     if (child < 0) return 1;
     int status = 0;
     while (::waitpid(child, &status, 0) < 0) {

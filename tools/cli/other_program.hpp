@@ -3,6 +3,7 @@
 // when they are first used.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <sys/types.h>
 #include <vector>
@@ -18,9 +19,12 @@ int become_program(const char* name, char** argv);
 /// for its end. Returns its exit status. [setup]
 int run_tool(std::vector<std::string> arguments);
 
+/// Whether a program is ended (SIGTERM) with the thread that has started it.
+enum class Lifetime : std::uint8_t { own, of_this };
+
 /// Starts a program beside this one with these arguments, the first of which is the name of a
 /// command, and does not wait for it; builds it first where build_on_demand() does that. Returns its
 /// process, or -1 after printing why it does not run. [setup]
-pid_t start_program(const char* name, std::vector<std::string> arguments);
+pid_t start_program(const char* name, std::vector<std::string> arguments, Lifetime lifetime);
 
 }  // namespace hal::tools

@@ -45,17 +45,21 @@ bool MomentLink::start(const ReplayOptions& options, JournalFile& file, const Wh
 }
 
 bool MomentLink::send(const Errand& errand, std::string_view request) {
-    if (::send(socket_, &errand, sizeof errand, MSG_NOSIGNAL) < 0) {
-        ended_ = true;
-    }
+    send_packet(&errand, sizeof errand);
     while (!ended_ && !request.empty()) {
         const std::string_view part = request.substr(0, max_packet);
-        if (::send(socket_, part.data(), part.size(), MSG_NOSIGNAL) < 0 && errno != EINTR) {
-            ended_ = true;
-        }
+        send_packet(part.data(), part.size());
         request.remove_prefix(part.size());
     }
     return !ended_;
+}
+
+void MomentLink::send_packet(const void* bytes, std::size_t size) {
+    while (::send(socket_, bytes, size, MSG_NOSIGNAL) < 0) {
+        if (errno == EINTR) continue;
+        ended_ = true;
+        return;
+    }
 }
 
 std::optional<MomentLink::Received> MomentLink::receive(int timeout_ms) {

@@ -2,6 +2,7 @@
 // The front's end of the socket to the process that executes a journal.
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -41,6 +42,8 @@ public:
     void interrupt(bool on) noexcept { frames_.interrupt(on); }
 
 private:
+    void send_packet(const void* bytes, std::size_t size);
+
     Keyframes& frames_;
     int socket_ = -1;
     bool ended_ = false;

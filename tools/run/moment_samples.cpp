@@ -43,7 +43,7 @@ const Pin* pin_of(const Model& model, const std::string& name) {
 }  // namespace
 
 MomentSamples::MomentSamples(Session& session, const std::string& names, const std::string& fastest)
-    : session_(session) {
+    : session_(session), fastest_(fastest) {
     std::istringstream in(names);
     std::vector<std::string> wanted;
     for (std::string name; in >> name;) {
@@ -54,30 +54,44 @@ MomentSamples::MomentSamples(Session& session, const std::string& names, const s
         return;
     }
     problem_ = unknown_value(session.model(), wanted);
-    for (const std::string& name : wanted) {
-        add_column(name, fastest);
+    for (std::string& name : wanted) {
+        Column& column = columns_.emplace_back();
+        column.name = std::move(name);
+    }
+    group_columns();
+}
+
+/// Gives the values that the machine has by now their groups.
+void MomentSamples::group_columns() {
+    for (std::size_t i = 0; i < columns_.size(); ++i) {
+        if (!columns_[i].is_grouped) {
+            group_column(i);
+        }
     }
 }
 
-void MomentSamples::add_column(const std::string& name, const std::string& fastest) {
-    Column column;
-    column.name = name;
-    if (const auto reading = session_.values().read({name}).front()) {
-        column.type = reading->type;
-    }
-    const Pin* const pin = pin_of(session_.model(), name);
+void MomentSamples::group_column(std::size_t index) {
+    Column& column = columns_[index];
+    const auto reading = session_.values().read({column.name}).front();
+    if (!reading) return;
+    column.is_grouped = true;
+    column.type = reading->type;
+    const Pin* const pin = pin_of(session_.model(), column.name);
     const Thread* const thread = pin ? thread_of(*pin) : nullptr;
     if (pin) {
         column.unit = pin->unit;
     }
-    Group& group = group_of(thread ? thread->name : fastest);
-    group.columns.push_back(columns_.size());
-    group.names.push_back(name);
-    columns_.push_back(std::move(column));
+    Group& group = group_of(thread ? thread->name : fastest_);
+    group.columns.push_back(index);
+    group.names.push_back(column.name);
+    ++grouped_;
 }
 
+/// Returns a group without rows: a value that is loaded later has a group of its own.
 MomentSamples::Group& MomentSamples::group_of(const std::string& thread) {
-    const auto known = std::ranges::find(groups_, thread, &Group::thread);
+    const auto known = std::ranges::find_if(groups_, [&thread](const Group& group) {
+        return group.thread == thread && group.words.empty();
+    });
     if (known != groups_.end()) return *known;
     Group& group = groups_.emplace_back();
     group.thread = thread;
@@ -90,20 +104,29 @@ MomentSamples::Group& MomentSamples::group_of(const std::string& thread) {
 }
 
 void MomentSamples::add(const JournaledCycle& cycle) {
-    const auto group = std::ranges::find(groups_, cycle.thread, &Group::thread);
-    if (group == groups_.end()) return;
-    const auto readings = session_.values().read(group->names);
-    const auto exists = [](const auto& reading) { return reading.has_value(); };
-    if (!std::ranges::all_of(readings, exists)) return;  // one is loaded later
-    group->words.push_back(cycle.number);
-    group->words.push_back(static_cast<std::uint64_t>(cycle.time_ns));
-    for (const auto& reading : readings) {
-        group->words.push_back(word_of(*reading));
+    if (grouped_ < columns_.size()) {
+        group_columns();
     }
-    words_ += group->width();
+    for (Group& group : groups_) {
+        if (group.thread == cycle.thread) {
+            add_row(group, cycle);
+        }
+    }
     if (words_ > max_words) {
         drop_oldest();
     }
+}
+
+void MomentSamples::add_row(Group& group, const JournaledCycle& cycle) {
+    const auto readings = session_.values().read(group.names);
+    const auto exists = [](const auto& reading) { return reading.has_value(); };
+    if (!std::ranges::all_of(readings, exists)) return;  // one was unloaded
+    group.words.push_back(cycle.number);
+    group.words.push_back(static_cast<std::uint64_t>(cycle.time_ns));
+    for (const auto& reading : readings) {
+        group.words.push_back(word_of(*reading));
+    }
+    words_ += group.width();
 }
 
 /// Leaves out the older half of all rows.

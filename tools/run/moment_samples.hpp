@@ -13,7 +13,7 @@
 namespace hal::tools {
 
 /// A value has a row for each cycle of the thread that writes or reads it; one without a thread, for
-/// each cycle of the fastest thread. [setup] with the session's lock held
+/// each cycle of the fastest thread. Its rows begin when it is loaded. [setup] with the session's lock held
 class MomentSamples {
 public:
     static constexpr std::size_t max_names = 100;
@@ -35,6 +35,7 @@ private:
         std::string name;
         hal_type type = HAL_TYPE_FLOAT;
         std::string unit;
+        bool is_grouped = false;  // the machine has had it
     };
     struct Group {
         std::string thread;
@@ -44,13 +45,17 @@ private:
         std::vector<std::uint64_t> words;  // rows: cycle, time, values
         std::size_t width() const { return 2 + columns.size(); }
     };
-    void add_column(const std::string& name, const std::string& fastest);
+    void group_columns();
+    void group_column(std::size_t index);
     Group& group_of(const std::string& thread);
+    void add_row(Group& group, const JournaledCycle& cycle);
     void drop_oldest();
 
     Session& session_;
+    const std::string fastest_;
     std::string problem_;
     std::vector<Column> columns_;
+    std::size_t grouped_ = 0;  // of columns_
     std::vector<Group> groups_;
     std::size_t words_ = 0;
     std::uint64_t left_out_ = 0;  // rows

@@ -46,11 +46,18 @@ void ReplayClient::write() {
         if (bytes < 0 && errno == EINTR) continue;
         if (bytes < 0) {
             ended_ = ended_ || errno != EAGAIN;
-            return;
+            break;
         }
         sent_ += static_cast<std::size_t>(bytes);
     }
-    out_.clear();
+    drop_sent();
+}
+
+/// A slow client may always have something left: what it has read must not pile up.
+void ReplayClient::drop_sent() {
+    constexpr std::size_t max_sent = std::size_t{1} << 20;
+    if (has_output() && sent_ < max_sent) return;
+    out_.erase(0, sent_);
     sent_ = 0;
 }
 

@@ -45,6 +45,8 @@ public:
     std::uint64_t numbers = 0;  ///< of subscriptions and rows, so far
 
 private:
+    void drop_sent();
+
     static constexpr std::size_t max_line = std::size_t{1} << 20;
     static constexpr std::size_t max_waiting = std::size_t{64} << 20;
 

@@ -26,7 +26,8 @@ class PanelProcess {
 public:
     PanelProcess(const std::string& instance, std::uint16_t port)
         : process_(start_program("hal-panel",
-                                 {"panel", "--name", instance, "--port", std::to_string(port)})),
+                                 {"panel", "--name", instance, "--port", std::to_string(port)},
+                                 Lifetime::of_this)),
           descriptor_(process_ < 0 ? -1
                                    : static_cast<int>(::syscall(SYS_pidfd_open, process_, 0))) {}
     ~PanelProcess() {

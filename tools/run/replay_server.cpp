@@ -96,7 +96,7 @@ bool ReplayServer::open(const std::string& name, Diagnostics& diagnostics) {
 
 void ReplayServer::begin_with(const std::vector<std::string>& words) {
     Work work;
-    if (parse_move(words, work.errand).empty()) {
+    if (parse_move(words, work).empty()) {
         first_moves_.push_back(std::move(work));
     }
 }
@@ -295,7 +295,11 @@ void ReplayServer::follow(ReplayClient& client, const Work& work) {
 void ReplayServer::set_options(ReplayClient& client, const Json& request, const Work& work) {
     const Json& options = request["options"];
     if (!options.is_object()) return reject(work.client, work.id, "options must be an object");
-    client.json = options.value("json", client.json);
+    const auto json = options.find("json");
+    if (json != options.end() && !json->is_boolean()) {
+        return reject(work.client, work.id, "json must be true or false");
+    }
+    client.json = json == options.end() ? client.json : json->get<bool>();
     reply(work.client, work.id, "");
 }
 
@@ -353,11 +357,10 @@ void ReplayServer::move(const std::vector<std::string>& words, Work work) {
         pause();
         return reply_command(work, true, "");
     }
-    if (const std::string problem = parse_move(words, work.errand); !problem.empty()) {
+    if (const std::string problem = parse_move(words, work); !problem.empty()) {
         return reply_command(work, false, problem + "\n");
     }
     work.job = Job::move;
-    end_scan();
     if (work.is_goto()) {
         replace_gotos();
     }
@@ -366,21 +369,33 @@ void ReplayServer::move(const std::vector<std::string>& words, Work work) {
 
 /// Parses a command, also those that only a time line has. Returns why it is invalid; "" when it is
 /// valid.
-std::string ReplayServer::parse_move(const std::vector<std::string>& words, Errand& errand) {
-    if (words[0] != "fault") return commands_.parse(words, errand);
+std::string ReplayServer::parse_move(const std::vector<std::string>& words, Work& work) {
+    if (words[0] != "fault") return commands_.parse(words, work.errand);
     const bool is_next = words.size() == 2 && words[1] == "next";
     if (!is_next && (words.size() != 2 || words[1] != "previous")) {
         return "fault: write: fault next, or: fault previous; faults of the past cannot be "
                "acknowledged";
     }
-    const std::uint64_t here = cycles_of(shown_);
-    errand.kind = Errand::Kind::seek;
-    errand.count = is_next ? timeline_.fault_after(here) : timeline_.fault_before(here);
-    if (errand.count != 0) return "";
-    if (!is_next) return "no earlier fault";
-    if (knows_end_) return "no later fault";
-    errand.kind = Errand::Kind::run_to_fault;
+    work.fault = is_next ? Fault::next : Fault::previous;
+    work.errand.kind = Errand::Kind::run_to_fault;
     return "";
+}
+
+/// Sets the errand of a move to a fault, seen from the present moment. Returns why there is no such
+/// fault; "" for other work, too.
+std::string ReplayServer::find_fault(Work& work) const {
+    if (work.fault == Fault::none) return "";
+    const bool is_next = work.fault == Fault::next;
+    const std::uint64_t here = cycles_of(shown_);
+    const std::uint64_t found =
+        is_next ? timeline_.fault_after(here) : timeline_.fault_before(here);
+    if (found != 0) {
+        work.errand.kind = Errand::Kind::seek;
+        work.errand.count = found;
+        return "";
+    }
+    if (!is_next) return "no earlier fault";
+    return knows_end_ && timeline_.has_all_faults() ? "no later fault" : "";
 }
 
 // --- work ---
@@ -394,21 +409,26 @@ void ReplayServer::end_scan() {
     first_moves_.clear();
 }
 
-/// Answers what a newer goto makes useless.
+/// Answers what a newer goto makes useless: gotos behind which no other move waits.
 void ReplayServer::replace_gotos() {
-    for (const Work& work : waiting_) {
-        if (work.is_goto()) {
-            reply_command(work, false, "replaced by a newer goto\n");
+    const auto is_other = [](const Work& work) { return work.moves() && !work.is_goto(); };
+    const auto last = std::ranges::find_if(waiting_.rbegin(), waiting_.rend(), is_other);
+    const auto begin = last.base();
+    for (auto work = begin; work != waiting_.end(); ++work) {
+        if (work->is_goto()) {
+            reply_command(*work, false, "replaced by a newer goto\n");
         }
     }
-    std::erase_if(waiting_,
-                  [](const Work& work) { return work.is_goto() || work.job == Job::publish; });
+    const auto is_useless = [](const Work& work) {
+        return work.is_goto() || work.job == Job::publish;
+    };
+    waiting_.erase(std::remove_if(begin, waiting_.end(), is_useless), waiting_.end());
 }
 
 /// Interrupts an errand that what waits need not wait for.
 void ReplayServer::interrupt_older() {
     if (!is_busy_ || is_interrupted_ || waiting_.empty()) return;
-    const auto move = std::ranges::find(waiting_, Job::move, &Work::job);
+    const auto move = std::ranges::find_if(waiting_, &Work::moves);
     const bool has_move = move != waiting_.end();
     const auto passed = std::chrono::steady_clock::now() - begun_;
     bool is_older = false;
@@ -464,6 +484,11 @@ void ReplayServer::publish(const ReplayClient& client, std::uint64_t subscriptio
 
 void ReplayServer::start_next() {
     if (is_busy_ || waiting_.empty()) return;
+    if (const std::string problem = find_fault(waiting_.front()); !problem.empty()) {
+        reply_command(waiting_.front(), false, problem + "\n");
+        waiting_.pop_front();
+        return start_next();
+    }
     const bool is_elsewhere = cycles_of(now_) != cycles_of(shown_);
     const Work& next = waiting_.front();
     if (is_elsewhere && !next.is_absolute() && next.job != Job::scan) {
@@ -480,6 +505,9 @@ void ReplayServer::start_next() {
 
 void ReplayServer::start(Work work) {
     current_ = std::move(work);
+    if (current_.moves()) {
+        end_scan();
+    }
     is_busy_ = true;
     is_interrupted_ = false;
     text_.clear();
@@ -530,7 +558,7 @@ void ReplayServer::finish(bool good) {
             to->send(data_);
         }
         break;
-    case Job::restore: break;
+    case Job::restore: finish_restore(); break;
     }
 }
 
@@ -541,6 +569,7 @@ void ReplayServer::show() {
     shown_ = now_;
     shown_["took_ms"] = took.count();
     shown_["condition"] = commands_.condition();
+    shown_["left_out"] = timeline_.left_out();
     broadcast("moment", shown_);
     publish_all();
 }
@@ -560,6 +589,13 @@ void ReplayServer::finish_move(bool good) {
     reply_command(current_, good, text_);
 }
 
+/// What a machine opens again may end its execution at another cycle: then clients see it there.
+void ReplayServer::finish_restore() {
+    if (cycles_of(now_) != cycles_of(shown_)) {
+        show();
+    }
+}
+
 void ReplayServer::finish_rows(bool good) {
     ReplayClient* const to = client(current_.client);
     if (!to) return;
@@ -567,7 +603,8 @@ void ReplayServer::finish_rows(bool good) {
         return reject(current_.client, current_.id, "interrupted by a move");
     }
     if (!good && data_.find('\n') == std::string::npos) {
-        return reject(current_.client, current_.id, data_);
+        const std::string& problem = data_.empty() ? text_ : data_;
+        return reject(current_.client, current_.id, problem.substr(0, problem.find('\n')));
     }
     const std::size_t first = data_.find('\n');
     const std::size_t second = data_.find('\n', first + 1);

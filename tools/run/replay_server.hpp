@@ -52,6 +52,8 @@ private:
         publish,  ///< the values of a subscription
         restore,  ///< back to the moment, after an errand that was interrupted
     };
+    /// Which fault a move goes to: a seek, or an execution, of what is known when it starts.
+    enum class Fault : std::uint8_t { none, next, previous };
     struct Work {
         Job job = Job::move;
         Errand errand = {};
@@ -59,7 +61,14 @@ private:
         std::string id = "null";  // of the request, as JSON
         std::string request = {};
         std::uint64_t subscription = 0;
+        Fault fault = Fault::none;
 
+        /// The machine may be at another cycle afterwards; `where` and `break` leave it.
+        bool moves() const {
+            const bool stays =
+                errand.kind == Errand::Kind::where || errand.kind == Errand::Kind::check;
+            return job == Job::move && !stays;
+        }
         bool is_goto() const { return job == Job::move && errand.kind == Errand::Kind::position; }
         /// It ends at a cycle that does not depend on the present one.
         bool is_absolute() const { return is_goto() || errand.kind == Errand::Kind::seek; }
@@ -91,7 +100,8 @@ private:
     void read_rows(const Json& request, Work work);
     static bool is_move(std::string_view command);
     void move(const std::vector<std::string>& words, Work work);
-    std::string parse_move(const std::vector<std::string>& words, Errand& errand);
+    std::string parse_move(const std::vector<std::string>& words, Work& work);
+    std::string find_fault(Work& work) const;
 
     // work
     void add(Work work);
@@ -110,6 +120,7 @@ private:
     void show();
     void finish_scan();
     void finish_move(bool good);
+    void finish_restore();
     void finish_rows(bool good);
     void finish_publish();
     static std::uint64_t cycles_of(const Json& position) {

@@ -34,14 +34,25 @@ ReplayTimeline::ReplayTimeline(JournalFile& file) {
 
 bool ReplayTimeline::add(std::string_view text) {
     Json json = Json::parse(text, nullptr, false);
-    if (!json.is_object() || marks_.size() >= max_marks) return false;
-    const bool is_known =
-        std::ranges::any_of(marks_, [&json](const Mark& mark) { return mark.json == json; });
-    if (is_known) return false;
+    if (!json.is_object()) return false;
     const auto cycles = json.value("cycles", std::uint64_t{0});
+    if (is_known(cycles, json)) return false;
     const bool is_fault = json.value("kind", "") == "fault";
+    Count& count = is_fault ? faults_ : others_;
+    if (count.kept == max_marks) {
+        ++count.left_out;
+        return false;
+    }
+    ++count.kept;
     marks_.push_back({cycles, is_fault, std::move(json)});
     return true;
+}
+
+bool ReplayTimeline::is_known(std::uint64_t cycles, const Json& json) const {
+    for (auto mark = marks_.rbegin(); mark != marks_.rend() && mark->cycles >= cycles; ++mark) {
+        if (mark->json == json) return true;
+    }
+    return false;
 }
 
 std::uint64_t ReplayTimeline::fault_after(std::uint64_t cycles) const {

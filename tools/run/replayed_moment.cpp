@@ -5,6 +5,7 @@
 #include <cerrno>
 #include <cstring>
 #include <fmt/core.h>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <poll.h>
 #include <sys/socket.h>
@@ -218,7 +219,8 @@ void ReplayedMoment::run(const ValueCondition& condition) {
 }
 
 void ReplayedMoment::step(std::uint64_t count, const std::string& thread) {
-    const std::uint64_t target = cycles() + count;  // an edit may execute several cycles
+    constexpr std::uint64_t max = std::numeric_limits<std::uint64_t>::max();
+    const std::uint64_t target = cycles() + std::min(count, max - cycles());
     const auto goes_on = [&] { return thread.empty() ? cycles() < target : count > 0; };
     while (goes_on() && next()) {
         if (machine_.execution().newest().thread == thread) {
@@ -241,9 +243,13 @@ void ReplayedMoment::seek(std::uint64_t target, const std::string& condition) {
         condition.copy(errand.condition, sizeof errand.condition - 1);
         return resume(errand, target);
     }
-    while (cycles() < target && next()) {
+    std::uint64_t before = cycles();
+    while (cycles() < target) {
+        before = cycles();
+        if (!next()) break;
     }
     if (resumed_) return;
+    if (cycles() > target) return seek(before, condition);  // an edit executes several cycles
     ValueCondition searched;
     searched.parse(condition);
     tell(searched.name());
@@ -265,7 +271,8 @@ void ReplayedMoment::search(const Errand& errand) {
         const bool holds = !condition.empty() && condition.holds(machine_.session());
         const bool suits = condition.empty() ? machine_.execution().newest().thread == errand.thread
                                              : holds && !held;
-        if (suits) {
+        const bool is_earlier = cycles() < errand.limit;  // an edit executes several cycles
+        if (suits && is_earlier) {
             found.push_back(cycles());
         }
         held = holds;
@@ -508,6 +515,7 @@ void ReplayedMoment::send_position(const std::string& text, bool is_moving) {
                     {"fastest_cycle", fastest_number_},
                     {"time_ns", newest.time_ns},
                     {"frontier", frontier_},
+                    {"edits", edits()},
                     {"moving", is_moving},
                     {"ended", machine_.execution().state() != ReExecution::State::goes_on},
                     {"running", runs_},
@@ -523,6 +531,11 @@ void ReplayedMoment::send_progress() {
     if (!marks_ || now - sent_ < interval) return;
     sent_ = now;
     send_position("", true);
+}
+
+/// Returns how many changes made the machine what it is: of the journal, and by --edit or --netlist.
+std::uint64_t ReplayedMoment::edits() const {
+    return machine_.execution().edits() + (machine_.change().done() ? 1 : 0);
 }
 
 // --- what is printed ---

@@ -51,6 +51,7 @@ private:
     KeyframeMark mark() const;
     std::uint64_t cycles() const { return machine_.execution().cycles(); }
     void tell(const std::string& found = "");
+    std::uint64_t edits() const;
     std::string position_text() const;
     std::string state_text();
     void send(Packet kind, std::string_view text);

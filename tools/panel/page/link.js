@@ -186,22 +186,28 @@ async function followMoment() {
     moveTo(reply.moment);
 }
 
-/// The edits before the moment: the machine has other names behind the next one.
-function editsBefore({timeline, moment}) {
-    const isBefore = mark => mark.cycles <= (moment.cycles ?? 0);
-    return timeline.marks.filter(mark => mark.kind !== 'fault' && isBefore(mark)).length;
-}
-
 let knownEdits = -1;
 function moveTo(moment) {
     state.past.moment = moment;
     emit('moment');
     if (moment.moving) return;
     emit('logged');
-    const edits = editsBefore(state.past);
-    if (edits !== knownEdits) emit('machine');
-    knownEdits = edits;
+    // behind another number of edits the machine may have other names
+    if (moment.edits !== knownEdits) emit('machine');
+    knownEdits = moment.edits;
     readStatus(0);
+}
+
+const marksInterval = 200;  // ms
+let marksTimer = 0;
+/// The first execution of a journal may find thousands of marks: pages draw them together.
+function noteMark(mark) {
+    state.past.timeline.marks.push(mark);
+    if (marksTimer !== 0) return;
+    marksTimer = setTimeout(() => {
+        marksTimer = 0;
+        if (state.past?.timeline) emit('marks');
+    }, marksInterval);
 }
 
 function note(entry) {
@@ -256,9 +262,7 @@ function receive(text) {
             if (state.past?.timeline) moveTo(message);
             break;
         case 'mark':
-            if (!state.past?.timeline) break;
-            state.past.timeline.marks.push(message);
-            emit('marks');
+            if (state.past?.timeline) noteMark(message);
             break;
         case 'log':
             note(message);

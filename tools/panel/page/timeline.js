@@ -97,6 +97,7 @@ export class TimeLine {
     // ---- moves
 
     goTo(time_ns) {
+        if (!state.past?.timeline) return;  // the connection was lost meanwhile
         const {end_ns} = state.past.timeline;
         this.move(['goto', `${Math.round(Math.min(end_ns, Math.max(0, time_ns)))}ns`]);
     }
@@ -145,7 +146,7 @@ export class TimeLine {
     }
 
     dragTo(event) {
-        if (this.drag_ns === null) return;
+        if (this.drag_ns === null || !state.past?.timeline) return;
         this.drag_ns = this.timeAt(event);
         this.goTo(this.drag_ns);
         this.drawThumb(this.drag_ns);
@@ -177,6 +178,8 @@ export class TimeLine {
         this.bar.hidden = !past;
         if (!past?.timeline) return;
         const {moment, timeline} = past;
+        if (this.timeline !== timeline) this.known_ns = 0;  // of another journal
+        this.timeline = timeline;
         this.known_ns =
             moment.ended ? timeline.end_ns : Math.max(this.known_ns, moment.time_ns ?? 0);
         this.unknown.style.left = `${percent(this.known_ns, timeline.end_ns)}%`;
@@ -233,6 +236,7 @@ export class TimeLine {
             parts.push(
                 'without keyframes: going back executes the journal from its begin; the last ' +
                 `move took ${(moment.took_ms / 1000).toFixed(2)} s`);
+        if (moment?.left_out > 0) parts.push(`${moment.left_out} further marks are not shown`);
         parts.push(...past?.timeline?.notes ?? []);
         text(this.note, parts.join('; '));
         this.note.classList.toggle('bad', Boolean(this.problem));
