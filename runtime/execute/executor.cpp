@@ -47,9 +47,9 @@ void Executor::end_rows() {
     }
 }
 
-std::uint64_t Executor::halt() {
+Executor::Halting Executor::halt() {
     end_rows();
-    stop();
+    const bool has_run = stop();
     const std::scoped_lock own(runners_mutex_);
     const std::uint64_t ticket = ++halt_tickets_;
     for (const auto& runner : runners_) {
@@ -58,7 +58,7 @@ std::uint64_t Executor::halt() {
             runner->call();
         }
     }
-    return ticket;
+    return {ticket, has_run};
 }
 
 Executor::Halt Executor::halted(std::uint64_t ticket) const {

@@ -50,13 +50,17 @@ public:
     bool reset(Core& core);
 
     void start() { running_.store(true, std::memory_order_release); }
-    void stop() { running_.store(false, std::memory_order_release); }
+    /// Returns whether the functions ran.
+    bool stop() { return running_.exchange(false, std::memory_order_acq_rel); }
     bool running() const { return running_.load(std::memory_order_acquire); }
     /// Ends the rows of probes: cycles without functions give none, because the machine ends. [any]
     void end_rows();
-    /// Does the same as end_rows() and stop(), from any thread, and wakes slow threads. Returns a
-    /// ticket for halted(). [any]
-    std::uint64_t halt();
+    struct Halting {
+        std::uint64_t ticket = 0;  ///< for halted()
+        bool has_run = false;  ///< functions ran before
+    };
+    /// Does the same as end_rows() and stop(), from any thread, and wakes slow threads. [any]
+    Halting halt();
     enum class Halt { pending, done, hung };
     /// Returns whether the outputs of all threads have had their safe values since halt() returned
     /// the ticket. [any]

@@ -97,6 +97,7 @@ ExecutionJournal::FastestThread ExecutionJournal::continue_in(const std::string&
 
 void ExecutionJournal::flush() {
     const std::scoped_lock own(mutex_);
+    note_halt();
     for (const auto& thread : threads_) {
         thread->inputs->take(thread->words);
         encode(*thread);
@@ -126,6 +127,18 @@ CycleInputs* ExecutionJournal::thread_made(const std::string& name, std::int64_t
 
 void ExecutionJournal::add(ExecutionEntry entry) {
     const std::scoped_lock own(mutex_);
+    note_halt();
+    write(entry);
+}
+
+/// A halt is noted before the next entry, and at the latest with the next cycles.
+void ExecutionJournal::note_halt() {
+    if (is_halt_unnoted_.exchange(false)) {
+        write({.kind = ExecutionEntry::Kind::stop});
+    }
+}
+
+void ExecutionJournal::write(const ExecutionEntry& entry) {
     writer_->message(entries_, entry_count_++, unix_ns(monotonic_ns()), to_json(entry));
 }
 
@@ -240,6 +253,7 @@ void ExecutionJournal::report_failure() {
 }
 
 void ExecutionJournal::drain() {
+    note_halt();
     const std::int64_t now_ns = monotonic_ns();
     for (const auto& thread : threads_) {
         thread->inputs->take(thread->words);

@@ -3,6 +3,7 @@
 // what happened to it.
 #pragma once
 
+#include <atomic>
 #include <condition_variable>
 #include <cstdint>
 #include <functional>
@@ -48,6 +49,7 @@ public:
     void withdrawn() override;
     void written(std::vector<std::pair<std::string, std::uint64_t>> values) override;
     void switched(bool running) override;
+    void halted() noexcept override { is_halt_unnoted_ = true; }
     void called(const SetupResults& results) override;
     void file_read(const SetupFile& file) override;
     void opened(const std::string& instance, const std::string& component,
@@ -116,6 +118,8 @@ private:
     void open(const std::string& path);
     void declare(Thread& thread);
     void add(ExecutionEntry entry);
+    void note_halt();
+    void write(const ExecutionEntry& entry);
     void add(const SetupRecord& record);
     void work();
     void report_failure();
@@ -145,6 +149,7 @@ private:
     std::int64_t flushed_ns_ = 0;
     bool closed_ = false;
     bool ends_ = false;
+    std::atomic<bool> is_halt_unnoted_{false};  // set by any thread
     std::condition_variable wake_;
     std::thread worker_;
 };

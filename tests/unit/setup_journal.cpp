@@ -30,6 +30,7 @@ struct Results final : ExecutionSink, CycleSchedule {
     void withdrawn() override {}
     void written(std::vector<std::pair<std::string, std::uint64_t>>) override {}
     void switched(bool) override {}
+    void halted() noexcept override {}
     std::string save(const std::string&) override { return ""; }
     void opened(const std::string&, const std::string&, const OutsideWorld&) override {}
 

@@ -56,6 +56,8 @@ public:
     virtual void written(std::vector<std::pair<std::string, std::uint64_t>> values) = 0;
     /// The functions were started or stopped.
     virtual void switched(bool running) = 0;
+    /// The functions were stopped at once, without the session's lock. Does not wait. [any]
+    virtual void halted() noexcept = 0;
     /// The transaction that takes effect next has made this call, or opened this file.
     virtual void called(const SetupResults& results) = 0;
     virtual void file_read(const SetupFile& file) = 0;

@@ -78,7 +78,13 @@ bool ThreadControl::stop(Diagnostics* diagnostics) {
     return false;
 }
 
-std::uint64_t ThreadControl::halt() { return state_.executor->halt(); }
+std::uint64_t ThreadControl::halt() {
+    const Executor::Halting halting = state_.executor->halt();
+    if (halting.has_run && state_.options.sink) {
+        state_.options.sink->halted();
+    }
+    return halting.ticket;
+}
 
 ThreadControl::Halt ThreadControl::halted(std::uint64_t ticket) const {
     switch (state_.executor->halted(ticket)) {
