@@ -239,7 +239,7 @@ class Chroot(unittest.TestCase):
 
     def check_machine(self):
         self.assertRegex(self.of_user("hal --version"), r"^hal \d+\.\d+\.\d+ ")
-        # again when other programs take the CPU for so long that the machine stops
+        # again when other programs take the CPU until the machine stops
         report = self.of_user(
             "cd; hal run /usr/share/halcyon/halfiles/furuta/hang.hal --for 2s 2>&1", tries=3
         )

@@ -2,7 +2,9 @@
 # SPDX-License-Identifier: MIT
 # packages: linuxcnc ethercat
 """linuxcnc_wire_test.py HAL: LinuxCNC's own programs, as the Debian package linuxcnc-uspace installs them, move five axes over a wire with time
-slots. Nine processes with real-time threads: on two CPUs they run beside no other test. 77: the package is not installed."""
+slots. Nine processes with real-time threads: on two CPUs they run beside no other test. 77: the package is not installed.
+"""
+
 import os
 import shutil
 import subprocess

@@ -3,6 +3,7 @@
 # packages: canopen
 """The Python package perfetto, with the public schema of Perfetto, parses what `hal trace` writes: no unknown field, and a replay of the timeline as
 a viewer does it: trace_perfetto_test.py PROGRAM."""
+
 import os
 import signal
 import subprocess
