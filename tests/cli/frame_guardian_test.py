@@ -12,7 +12,7 @@ import unittest
 from pathlib import Path
 
 from guarded_machine import GuardedMachine
-from harness import Case, wait_until
+from harness import PLUGINS, Case, wait_until
 from own_network import own_network
 
 TYPE = 0x88B5  # IEEE 802, local experimental ethertype 1
@@ -25,6 +25,31 @@ addf guard.update servo
 start
 """
 SENT = "the stop frames were handed to the driver 3 times"
+# a function before that of the guardian throws: at once, and in the first cycle of the next start
+FAILS = """loadrt threads name1=servo period1=1000000
+loadrt test_faulty names=drive
+loadrt frame_guardian names=guard link=sim:bus send="201#0000"
+addf drive.run servo
+addf guard.update servo
+start
+advance 50ms
+getp guard.stops
+setp drive.throws TRUE
+advance 10ms
+setp drive.throws FALSE
+start
+advance 50ms
+getp guard.stops
+setp drive.throws TRUE
+advance 10ms
+start
+advance 10ms
+getp guard.stops
+setp drive.throws FALSE
+start
+advance 50ms
+getp guard.stops
+"""
 # Stops a process in a way that no SIGCONT ends: ptrace(2), PTRACE_SEIZE and PTRACE_INTERRUPT
 TRACER = """import ctypes, os, sys, time
 process = int(sys.argv[1])
@@ -160,12 +185,11 @@ class FrameGuardian(GuardedMachine, Case):
         machine.send_signal(signal.SIGKILL)
         self.stops(since)
         errors = self.end(machine, signal.SIGKILL)[1]
-        self.assertIn(
-            "guard: the guardian has ended: nothing sends the stop frames until another one is "
-            "started\n"
-            "guard: another guardian has taken over; it sends what the first one has not sent\n",
-            errors,
-        )
+        for line in (
+            "the guardian has ended: nothing sends the stop frames until another one is started",
+            "another guardian has taken over; it sends what the first one has not sent",
+        ):
+            self.assertIn(f"guard: {line}\n", errors)
         self.assertIn(f"the process has ended; {SENT}", errors)
         self.assertIn(f"the process has ended; {SENT}", self.next_start())
 
@@ -242,6 +266,12 @@ class FrameGuardian(GuardedMachine, Case):
             wait_until(lambda: self.value("guard.stops") == str(number), "the stop is counted")
             self.comes("guard.stopped", "FALSE")
         self.end(machine)
+
+    def test_a_thread_that_fails_before_it_comes_to_the_function_sends_them_again(self):
+        self.environment["HALCYON_PLUGIN_PATH"] = str(Path(PLUGINS).parent / "plugins")
+        self.write("fails.hal", FAILS)
+        done = self.run_program("sim", "fails.hal")
+        self.assertEqual((0, "0\n1\n1\n3\n"), (done.returncode, done.stdout), done.stderr)
 
     def test_a_journal_is_executed_again(self):
         machine = self.start("run", "guard.hal", "--journal", "run.mcap", "--values", "*")

@@ -91,11 +91,12 @@ public:
             syscall(SYS_pidfd_send_signal, process_.get(), SIGCONT, nullptr, 0);
         }
     }
-    /// Kills it. [setup]
+    /// Kills it, and waits for its end for at most a second: a debugger may hold what is left of it.
+    /// [setup]
     void kill() noexcept {
         if (pid_ < 0) return;
         ::kill(pid_, SIGKILL);
-        waitpid(pid_, nullptr, 0);
+        has_ended_within(1'000'000'000);
         pid_ = -1;
     }
 

@@ -11,8 +11,10 @@ namespace hal::guardian {
 
 namespace {
 
-/// How long a round may take until its frames are on the bus, before it is attempted again.
+/// How long a round may take until its frames are on the bus, before it is attempted again: twice as
+/// long each time, because what a slow bus has not sent still waits in the queue of the interface.
 constexpr std::int64_t attempt_limit_ns = 100'000'000;
+constexpr std::uint32_t max_doublings = 4;
 /// When a round is attempted again at the latest.
 constexpr std::int64_t retry_ns = 10'000'000;
 /// How much of a declared frame a message has.
@@ -146,6 +148,7 @@ void StopTransmitter::begin(std::int64_t now_ns) noexcept {
     outcome_ = Outcome::sending;
     failure_ = Failure::none;
     unsent_ = 0;
+    late_attempts_ = 0;
     begun_ns_ = now_ns;
     last_sent_ns_ = now_ns;
     rounds_sent_ = 0;
@@ -260,8 +263,11 @@ void StopTransmitter::follow_attempt(std::int64_t now_ns) noexcept {
     }
     const std::uint32_t missing = missing_frames();
     if (missing == 0) return end_round(now_ns);
-    if (now_ns - attempt_ns_ < attempt_limit_ns) return;
     Failure why = failure_of_link();
+    if (why == Failure::down || why == Failure::bus_off)
+        return fail(missing, why);  // they are lost
+    if (now_ns - attempt_ns_ < attempt_limit_ns << std::min(late_attempts_, max_doublings)) return;
+    ++late_attempts_;
     if (why == Failure::none) {
         why = sees_bus_ ? Failure::unacknowledged : Failure::full;
     }
@@ -335,6 +341,7 @@ void StopTransmitter::accept(const can::Frame& frame) noexcept {
 
 void StopTransmitter::end_round(std::int64_t now_ns) noexcept {
     in_attempt_ = false;
+    late_attempts_ = 0;
     ++rounds_sent_;
     last_sent_ns_ = now_ns;
     outcome_ = Outcome::sending;

@@ -45,8 +45,8 @@ inline constexpr std::int64_t max_duration_ns = 60'000'000'000;
 /// accepted it. With confirmations a round is repeated until all of them have been received, and at
 /// most `rounds` times.
 ///
-/// An attempt at a round fails when the link rejects a frame, or when the round is not complete
-/// after 0.1 s. It is made again until it succeeds, so no round is ever left out. What this link
+/// An attempt at a round fails when the link rejects a frame or is lost, or when the round is not
+/// complete after 0.1 s. It is made again until it succeeds, so no round is ever left out. What this link
 /// still has in its queue is discarded first. The frames of other programs may wait in the queue of
 /// the interface, and are not ours to discard. So the frames of a second attempt are sent twice
 /// where the interface has priorities: urgently, ahead of what waits, and behind it, because an old
@@ -124,6 +124,7 @@ private:
     std::int64_t last_sent_ns_ = 0;  // end of the last complete round
     std::uint32_t rounds_sent_ = 0;
 
+    std::uint32_t late_attempts_ = 0;  // at this round
     bool in_attempt_ = false;  // it may still succeed
     std::uint64_t dropped_ = 0;  // by the link, before the attempt
     std::array<std::uint8_t, max_frames> missing_echoes_{};  // of each frame

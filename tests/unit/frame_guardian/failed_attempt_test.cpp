@@ -158,6 +158,36 @@ TEST_F(FailedAttempt, Overtakes_what_waits_and_follows_it) {
     EXPECT_EQ(outcome(), Outcome::sent);
 }
 
+TEST_F(FailedAttempt, Is_made_less_often_on_a_slow_bus) {
+    link_.has_priorities = true;
+    open("201#0000");
+    begin();
+    advance(10'000);
+    EXPECT_LE(link_.waiting.size(), 20U);
+    link_.transmit(100);
+    advance(1);
+    EXPECT_EQ(outcome(), Outcome::sent);
+}
+
+TEST_F(FailedAttempt, Is_made_again_at_once_when_the_controller_has_lost_its_frames) {
+    open("201#0000");
+    begin();
+    advance(500);
+    link_.controller = can::State::bus_off;
+    link_.answer = can::Sent::bus_off;
+    link_.waiting.clear();
+    advance(1);
+    EXPECT_EQ(unsent(), "201#0000: the controller is bus off");
+    advance(100);
+    link_.controller = can::State::active;
+    link_.answer = can::Sent::queued;
+    advance(11);
+    EXPECT_EQ(link_.waiting.size(), 1U);
+    link_.transmit(1);
+    advance(1);
+    EXPECT_EQ(outcome(), Outcome::sent);
+}
+
 TEST_F(FailedAttempt, On_a_listen_only_link_is_an_error_at_the_start) {
     StopFrames parsed;
     ASSERT_EQ(parse("201#0000", "", parsed), "");

@@ -33,7 +33,7 @@ constexpr std::int64_t replace_ns = 1000 * millisecond;  // between two attempts
 
 struct EventRecord {
     Event event = Event::stopping;
-    StopRecord stop;
+    StopRecord stop{};
 };
 
 /// What a cycle shows.
