@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: MIT
 """package.py ROOT BUILD: installs the build into a folder of its own, and builds a component against it from three lines of CMake."""
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -35,10 +36,20 @@ def run(*command, **options):
     return result.stdout
 
 
+def missing_headers(include):
+    """What installed headers include by a path below `include`, and is not installed."""
+    for header in include.rglob("*.hpp"):
+        for name in re.findall(r'^#include "([^"]+)"', header.read_text(), re.MULTILINE):
+            if not (include / name).exists() and not (header.parent / name).exists():
+                yield f"{header.relative_to(include)} includes {name}"
+
+
 def main(build):
     with tempfile.TemporaryDirectory() as folder:
         prefix, source = Path(folder) / "installed", Path(folder) / "mine"
         run("cmake", "--install", build, "--prefix", prefix)
+        if missing := sorted(missing_headers(prefix / "include")):
+            sys.exit("not installed:\n" + "\n".join(missing))
         source.mkdir()
         (source / "CMakeLists.txt").write_text(HEADER + PROJECT)
         (source / "mine.cpp").write_text(COMPONENT)
