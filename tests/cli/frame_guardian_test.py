@@ -267,6 +267,34 @@ class FrameGuardian(GuardedMachine, Case):
             self.comes("guard.stopped", "FALSE")
         self.end(machine)
 
+    def add_pair(self):
+        command = "ip link add pair0 type veth peer name pair1 && ip link set pair1 up && ip link set pair0 up"
+        if subprocess.run(["sh", "-c", command], capture_output=True).returncode != 0:
+            self.skipTest("this kernel has no pair of interfaces (veth)")
+
+    @staticmethod
+    def remove_pair():
+        subprocess.run(["ip", "link", "del", "pair0"], capture_output=True)
+
+    def test_a_guardian_that_cannot_be_replaced_is_tried_again(self):
+        self.add_pair()
+        self.addCleanup(self.remove_pair)
+        self.write("guard.hal", NETLIST.replace("eth:lo", "eth:pair0"))
+        machine = self.run_guarded()
+        self.remove_pair()
+        self.kill_guardian(machine)
+        self.comes("guard.guarded", "FALSE")
+        self.comes("guard.fault", "TRUE")
+        wait_until(lambda: not self.guardians_of(machine), "no other guardian is left")
+        self.assertIn("the guardian has ended", self.say("show", "fault"))
+        self.add_pair()
+        self.guarded()
+        errors = self.end(machine)[1]
+        self.assertIn(
+            "guard: no other guardian can be started: eth:pair0: no interface 'pair0'; ", errors
+        )
+        self.assertIn("guard: another guardian has taken over", errors)
+
     def test_a_thread_that_fails_before_it_comes_to_the_function_sends_them_again(self):
         self.environment["HALCYON_PLUGIN_PATH"] = str(Path(PLUGINS).parent / "plugins")
         self.write("fails.hal", FAILS)

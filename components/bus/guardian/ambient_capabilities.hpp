@@ -12,7 +12,8 @@
 namespace hal::bus {
 
 /// Passes the capabilities of the program's file on to a program that is started while this exists:
-/// raw frames, locked memory, real-time priority (capabilities(7), "ambient set"). Those that this
+/// the restart of a CAN controller, raw frames, locked memory, real-time priority (capabilities(7),
+/// "ambient set"). Those that this
 /// process does not have are left out. It calls the kernel directly, for the calling thread only.
 ///
 /// The destructor lowers exactly what the constructor has raised, however far that came. Lowering
@@ -52,7 +53,8 @@ public:
 
 private:
     using Sets = std::array<__user_cap_data_struct, _LINUX_CAPABILITY_U32S_3>;
-    static constexpr std::array passed_on = {13U, 14U, 23U};  // NET_RAW, IPC_LOCK, SYS_NICE
+    // NET_ADMIN, NET_RAW, IPC_LOCK, SYS_NICE
+    static constexpr std::array passed_on = {12U, 13U, 14U, 23U};
 
     static constexpr std::uint32_t bit(unsigned capability) noexcept {
         return std::uint32_t{1} << capability;

@@ -7,6 +7,7 @@
 #include <cerrno>
 #include <cstdint>
 #include <string>
+#include <utility>
 
 #include "link/system.hpp"
 
@@ -18,22 +19,18 @@ namespace hal::bus {
 class ReportLock {
 public:
     /// Locks the report of a guardian of `link`, and waits for at most `limit_ns` for the guardian
-    /// of a machine that has just ended. Returns the problem, or "". An empty name locks nothing.
-    /// [setup]
+    /// of a machine that has just ended. Returns the problem, or "". An empty name locks nothing,
+    /// and neither does a folder that is not writable: then there will be no report. [setup]
     std::string acquire(const std::string& report, const std::string& link,
                         std::int64_t limit_ns = 2'000'000'000) {
+        release();
         if (report.empty()) return {};
-        const std::string file = report + ".lock";
-        file_ =
-            link::Descriptor(::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600));
-        if (!file_) return "cannot open '" + file + "': " + link::reason();
+        link::Descriptor file(
+            ::open((report + ".lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600));
         const std::int64_t end = link::monotonic_ns() + limit_ns;
-        while (flock(file_.get(), LOCK_EX | LOCK_NB) != 0) {
-            if (errno != EWOULDBLOCK && errno != EINTR) {
-                return "cannot lock '" + file + "': " + link::reason();
-            }
+        while (file && flock(file.get(), LOCK_EX | LOCK_NB) != 0) {
+            if (errno != EWOULDBLOCK && errno != EINTR) return {};
             if (link::monotonic_ns() >= end) {
-                file_ = link::Descriptor();
                 return "another program uses '" + link +
                        "' with a guardian of this name, or such a guardian still sends its stop; "
                        "end that program, or load this one under another name";
@@ -41,6 +38,7 @@ public:
             const timespec pause = link::to_timespec(20'000'000);
             nanosleep(&pause, nullptr);
         }
+        file_ = std::move(file);
         return {};
     }
     /// Returns the descriptor that holds the lock, or -1.

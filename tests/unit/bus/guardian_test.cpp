@@ -108,6 +108,7 @@ TEST(ReportLock, Rejects_a_second_program) {
     }
     EXPECT_EQ(second.acquire(report, "can:can0", 0), "");
     EXPECT_EQ(first.acquire("", "can:can0"), "") << "no folder for reports";
+    EXPECT_EQ(first.acquire((folder / "none/report").string(), "can:can0"), "") << "not writable";
     fs::remove_all(folder);
 }
 

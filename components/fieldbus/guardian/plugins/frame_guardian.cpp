@@ -87,6 +87,7 @@ struct FrameGuardian : hal::Component {
         }
         shown_ = {};
         told_stall_ = false;
+        told_ready_ = true;
         silent_ns_ = 0;
         acknowledged_stop_ = 0;
         reporter_.start();
@@ -219,6 +220,8 @@ private:
     void start_guardian() {
         // the values of a guardian are inputs from outside
         const hal::link::OpeningLink link;
+        guardian_.reset();  // of a start that has failed behind it
+        lock_.release();
         const std::string report = hal::bus::report_file("frames-" + link_.get() + "-" + name_);
         std::string problem = lock_.acquire(report, link_.get());
         if (!problem.empty()) throw std::runtime_error(problem);
@@ -364,7 +367,8 @@ private:
             default: break;
             }
         }
-        if (now.is_ready != shown_.is_ready && !is_stopping(now)) {
+        if (now.is_ready != told_ready_ && !is_stopping(now)) {
+            told_ready_ = now.is_ready;
             tell(now.is_ready ? Event::link_ready : Event::link_lost);
         }
         if (const bool stalls = stalls_.load(std::memory_order_relaxed); stalls != told_stall_) {
@@ -562,6 +566,7 @@ private:
     std::string problem_;
     Status shown_;
     bool told_stall_ = false;
+    bool told_ready_ = true;
     hal::Reporter<EventRecord> reporter_{
         name_, [this](const EventRecord& record) { return line(record); }};
     hal::Background background_{[this](std::int64_t now, bool may_wait) { turn(now, may_wait); }};
