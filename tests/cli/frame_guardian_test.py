@@ -301,6 +301,17 @@ class FrameGuardian(GuardedMachine, Case):
         done = self.run_program("sim", "fails.hal")
         self.assertEqual((0, "0\n1\n1\n3\n"), (done.returncode, done.stdout), done.stderr)
 
+    def test_a_thread_that_is_started_again_does_not_hang(self):
+        machine = self.run_guarded()
+        for number in range(1, 6):
+            self.say("stop")
+            wait_until(lambda: len(self.bus.frames) >= 6 * number, "the stop is sent")
+            time.sleep(0.1)  # longer than heartbeat_ms: no cycle has run
+            self.say("start")
+            self.comes("guard.stopped", "FALSE")
+            self.comes("guard.stops", str(number))
+        self.end(machine)
+
     def test_a_journal_is_executed_again(self):
         machine = self.start("run", "guard.hal", "--journal", "run.mcap", "--values", "*")
         self.comes("guard.guarded", "TRUE")

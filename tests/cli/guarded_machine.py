@@ -95,6 +95,14 @@ class GuardedMachine:
         os.waitpid(terminal.process, 0)
         terminal.status = 0
 
+    def test_a_suspended_guardian_of_a_machine_that_is_killed(self):
+        machine = self.run_guarded()
+        self.suspend_guardian(machine)
+        since = time.monotonic()
+        machine.send_signal(signal.SIGKILL)
+        self.stops(since)
+        self.end(machine, signal.SIGKILL)
+
     def test_a_second_program_with_the_same_report_is_rejected(self):
         machine = self.run_guarded()
         errors = self.bad("run", "--name", "two", self.netlist)

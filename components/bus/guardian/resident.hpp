@@ -6,6 +6,7 @@
 #include <sched.h>
 #include <signal.h>
 #include <sys/mman.h>
+#include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
@@ -45,8 +46,10 @@ inline void be_resident() {
 }
 
 /// Closes what was inherited but the descriptors of a guardian, and opens the process that started
-/// it; an empty descriptor: it has ended already. [setup]
+/// it; an empty descriptor: it has ended already. A guardian that is suspended is continued by the
+/// kernel when that process, or the thread of it that started the guardian, ends. [setup]
 inline link::Descriptor open_parent(const char* pid_text) {
+    prctl(PR_SET_PDEATHSIG, SIGCONT);
     syscall(SYS_close_range, guardian_lock_fd + 1, ~0U, 0);
     const auto pid = static_cast<pid_t>(std::atoi(pid_text));
     link::Descriptor parent(static_cast<int>(syscall(SYS_pidfd_open, pid, 0)));
