@@ -6,24 +6,20 @@ axes home on their switches and run a program, the spindle turns. The steps of e
 folder of the modules, if it is not that of the Debian package linuxcnc-uspace. 77: the modules or network namespaces are missing.
 """
 
-import os
 import re
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
 from checks import check, checked, skip, wait_for
+from mesa_machine import HOST, MODULES, Machine
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tests/cli"))
 from own_network import own_network  # noqa: E402
 
-MODULES = Path(os.environ.get("HAL_RTMOD_DIR", "/usr/lib/linuxcnc/modules"))
-HAL = str(Path(sys.argv[1]).resolve())
 SCALE = 100
 AXES = ("x", "y", "z")
-HOST = "10.10.10.10"
 CARD = "[card]\ntype = 7i76e\n" + "".join(f"""[motor {axis}]
 stepgen = {n}
 scale = {SCALE}
@@ -80,68 +76,9 @@ NETLIST += "start\n"
 PROGRAM = ((10, 5, -2), (10, 15, -4), (-1.37, 15, 0.01), (0, 0, 0))
 
 
-class Machine:
-    """The card in a network namespace of its own, and hm2_eth under `hal run`."""
-
-    def __init__(self, folder):
-        self.folder = folder
-        (folder / "card.mesa").write_text(CARD)
-        (folder / "mill.hal").write_text(NETLIST)
-        environment = {"HOME": str(folder), "XDG_STATE_HOME": str(folder)}
-        self.environment = os.environ | environment | {"HAL_RTMOD_DIR": str(MODULES)}
-        self.running = []
-
-    def start(self, log, *command):
-        with open(self.folder / log, "w") as out:
-            process = subprocess.Popen(
-                command,
-                cwd=self.folder,
-                env=self.environment,
-                stdin=subprocess.DEVNULL,
-                stdout=out,
-                stderr=subprocess.STDOUT,
-            )
-        self.running.append(process)
-        return process
-
-    def run(self, *command):
-        return subprocess.run(command, capture_output=True, text=True, env=self.environment)
-
-    def connect(self):
-        """Makes the veth pair, m0 here and s0 beside the card. Returns whether that is possible."""
-        inside = self.start("namespace.log", "unshare", "--net", "sleep", "600")
-        here = os.readlink("/proc/self/ns/net")
-        wait_for(lambda: os.readlink(f"/proc/{inside.pid}/ns/net") != here)
-        enter = ("nsenter", "--target", str(inside.pid), "--net")
-        peer = ("peer", "name", "s0", "netns", str(inside.pid))
-        commands = (
-            ("ip", "link", "add", "m0", "type", "veth", *peer),
-            ("ip", "addr", "add", "10.10.10.1/24", "dev", "m0"),
-            ("ip", "link", "set", "m0", "up"),
-            (*enter, "ip", "addr", "add", f"{HOST}/24", "dev", "s0"),
-            (*enter, "ip", "link", "set", "s0", "up"),
-        )
-        if any(self.run(*command).returncode for command in commands):
-            return False
-        fast = ("chrt", "--fifo", "30")
-        real_time = fast if self.run(*fast, "true").returncode == 0 else ()
-        node = (*real_time, HAL, "node", "mesa", "card.mesa", "--address", HOST, "--verbose")
-        self.start("card.log", *enter, *node)
-        return wait_for(lambda: "7i76e at" in self.log("card.log"))
-
-    def log(self, name):
-        return (self.folder / name).read_text()
-
-    def get(self, pin):
-        return self.run(HAL, "shell", "getp", pin).stdout.strip()
-
+class Mill(Machine):
     def card_get(self, pin):
         return self.get(f"hm2_7i76e.0.{pin}")
-
-    def set(self, pin, value):
-        done = self.run(HAL, "shell", "setp", pin, str(value))
-        if done.returncode:
-            check(f"setp {pin} {value}", False, done.stdout, done.stderr)
 
     def counts(self):
         return [int(self.card_get(f"stepgen.{n:02}.counts")) for n in range(len(AXES))]
@@ -179,26 +116,10 @@ class Machine:
         self.set(f"{step}.control-type", "FALSE")
         return float(position)
 
-    def end(self):
-        for process in reversed(self.running):
-            process.terminate()
-            process.wait(60)
-
-
-def load(machine):
-    """Loads hm2_eth. One late answer among some thousand ends that (it has no retries), so a busy host needs several attempts. None: none succeeded."""
-    for _ in range(20):
-        run = machine.start("hal.log", HAL, "run", "mill.hal", "--no-picture")
-        wait_for(lambda: "hal shell" in machine.log("hal.log") or run.poll() is not None, 60)
-        if run.poll() is None:
-            return run
-        machine.running.remove(run)
-    check("hm2_eth loads", False, machine.log("hal.log")[-2000:])
-    return None
-
 
 def drive(machine):
-    run = load(machine)
+    machine.start_card(CARD)
+    run = machine.load(NETLIST)
     if run is None:
         return
     check("hm2_eth finds the device", "hm2_7i76e.0.7i76.0.0" in machine.log("hal.log"))
@@ -235,7 +156,7 @@ if not (MODULES / "hm2_eth.so").exists():
 if not own_network():
     skip("no network namespaces here; run it as root, or where user namespaces are allowed")
 with tempfile.TemporaryDirectory(prefix="hal-hm2-") as name:
-    one = Machine(Path(name))
+    one = Mill(Path(name))
     try:
         if not one.connect():
             skip("no veth pairs here")

@@ -26,6 +26,7 @@ constexpr ModuleDescriptor encoder_module(std::uint8_t count) {
 constexpr ModuleDescriptor muxed_encoder_module(std::uint8_t count) {
     return {Tag::muxed_encoder, 4, ClockTag::low, count, 0x3500, 5, 0, 0x3};
 }
+constexpr ModuleDescriptor mux_select_module{Tag::mux_select, 0, ClockTag::low, 1, 0, 0, 0, 0};
 constexpr ModuleDescriptor three_phase_module(std::uint8_t count) {
     return {Tag::three_phase_pwm, 0, ClockTag::high, count, 0x4500, 4, 0, 0x3};
 }
@@ -50,8 +51,8 @@ constexpr ModuleDescriptor modules_7i76e[] = {
     serial_module,         stepgen_module(5), three_phase_module(2), packet_transmit_module,
     packet_receive_module, led_module};
 constexpr ModuleDescriptor modules_7i95[] = {
-    dpll_module,   watchdog_module,   ports_module(2),         inmux_module, ssr_module,
-    serial_module, stepgen_module(6), muxed_encoder_module(6), led_module};
+    dpll_module,   watchdog_module,   ports_module(2),         inmux_module,      ssr_module,
+    serial_module, stepgen_module(6), muxed_encoder_module(6), mux_select_module, led_module};
 constexpr ModuleDescriptor modules_7i96s[] = {
     dpll_module,   watchdog_module,   ports_module(3), inm_module, ssr_module,       outm_module,
     serial_module, stepgen_module(5), pwm_module,      led_module, encoder_module(1)};
@@ -141,7 +142,7 @@ constexpr auto pins_7i95 = [] {
         pins[13 + 3 * pair] = pin(Tag::muxed_encoder, pair, b, false);
         pins[14 + 3 * pair] = pin(Tag::muxed_encoder, pair, index, false);
     }
-    pins[21] = pin(Tag::mux_select, PinDescriptor::all_units, 1, true);
+    pins[21] = pin(Tag::mux_select, 0, 1, true);
     for (unsigned n = 0; n < 5; ++n) {
         pins[22 + n] = pin(Tag::inmux, 0, pin_number::inmux::first_address + n, true);
     }

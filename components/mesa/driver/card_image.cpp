@@ -252,6 +252,7 @@ ModuleUse use_of(Tag tag) noexcept {
     case Tag::uart_receive:
     case Tag::packet_uart_transmit:
     case Tag::packet_uart_receive: return ModuleUse::without_pins;
+    case Tag::mux_select: return ModuleUse::driven;  // by the muxed encoders
     default: break;
     }
     if (kind_of(tag) != nullptr) return ModuleUse::driven;

@@ -46,6 +46,7 @@ constexpr OtherModule other_modules[] = {
     {0x07, "SPI"},
     {0x08, "SSI"},
     {0x0b, "translation RAM"},
+    {0x0d, "encoder multiplexer"},
     {0x0e, "buffered SPI"},
     {0x0f, "decoded buffered SPI"},
     {0x10, "old DPLL"},

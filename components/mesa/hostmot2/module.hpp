@@ -24,7 +24,7 @@ enum class Tag : std::uint8_t {
     uart_transmit = 0x09,
     uart_receive = 0x0a,
     muxed_encoder = 0x0c,
-    mux_select = 0x0d,  ///< in pin descriptors only
+    mux_select = 0x0d,  ///< pins without registers
     three_phase_pwm = 0x13,
     dpll = 0x1a,
     packet_uart_transmit = 0x1b,

@@ -38,7 +38,7 @@ constexpr Role roles[] = {
     {Tag::muxed_encoder, false, 4, 1, "index-mask"},
     {Tag::muxed_encoder, false, 5, 1, "probe"},
     {Tag::muxed_encoder, false, 6, 1, "shared-index"},
-    {Tag::mux_select, true, 1, 2, "select-%u"},
+    {Tag::mux_select, true, 1, 2, "sel%u"},
     {Tag::pwm, true, 1, 1, "out0"},
     {Tag::pwm, true, 2, 1, "out1"},
     {Tag::pwm, true, 3, 1, "enable"},
@@ -99,7 +99,7 @@ std::string function_of(const PinDescriptor& pin) {
         text = number;
     }
     if (pin.module == Tag::mux_select) {
-        text = "mux";
+        text = "encoder";  // as in LinuxCNC
     }
     if (pin.unit != PinDescriptor::all_units) {
         char unit[8];

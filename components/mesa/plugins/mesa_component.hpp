@@ -549,8 +549,8 @@ private:
     hal::Out<std::int32_t> packet_error_level_{*this, read_, "packet-error-level", "recent errors"};
     hal::Out<bool> packet_error_exceeded_{*this, read_, "packet-error-exceeded",
                                           "packet-error-level is at its limit"};
-    hal::Io<std::int32_t> packet_error_total_{*this, "packet-error-total",
-                                              "cycles that have lost a datagram"};
+    hal::Io<std::uint32_t> packet_error_total_{*this, "packet-error-total",
+                                               "cycles that have lost a datagram"};
     hal::Param<std::int32_t> packet_read_timeout_{
         *this,
         "packet-read-timeout",

@@ -145,8 +145,8 @@ public:
                           "time until the velocities match", {.unit = "s"}),
           dbg_err_at_match_(o.component, o.write, named(unit, "dbg_err_at_match"),
                             "position error when the velocities match"),
-          dbg_step_rate_(o.component, o.write, named(unit, "dbg_step_rate"), "rate",
-                         {.unit = "steps/s"}) {
+          dbg_step_rate_(o.component, o.write, named(unit, "dbg_step_rate"),
+                         "rate register: steps/s x 2^32 / clock") {
         const std::uint8_t version = module.descriptor.version;
         if (version == stepgen::version_with_latch) {
             latch_ = std::make_unique<StepgenLatch>(o, unit);
@@ -248,7 +248,7 @@ public:
         if (std::abs(std::int64_t{rate_}) > std::abs(std::int64_t{possible_rate_})) {
             possible_rate_ = rate_;
         }
-        dbg_step_rate_ = steps_per_s(rate_, clock_hz_);
+        dbg_step_rate_ = rate_;
     }
     /// [setup]
     void stop(Outgoing& out) const { out.put(rate_address_, 0); }
@@ -387,7 +387,8 @@ private:
     std::unique_ptr<hal::Param<bool>> swap_step_dir_;  ///< of firmware that can
     std::unique_ptr<StepgenLatch> latch_;  ///< the same
     hal::Out<double> dbg_pos_minus_prev_cmd_, dbg_ff_vel_, dbg_vel_error_, dbg_s_to_match_,
-        dbg_err_at_match_, dbg_step_rate_;
+        dbg_err_at_match_;
+    hal::Out<std::int32_t> dbg_step_rate_;
 };
 
 class StepgenPins final : public ModulePins {

@@ -200,11 +200,12 @@ TEST_F(ProbeTest, Leaves_the_pins_of_modules_without_a_driver_as_GPIO) {
 /// The multiplexer puts two encoders on the pins of a unit.
 TEST_F(ProbeTest, Uses_the_pins_of_half_as_many_units_as_multiplexed_encoders) {
     card.modules.push_back({Tag::muxed_encoder, 4, ClockTag::low, 6, 0x3500, 5, 0x00, 0x3});
+    card.modules.push_back({Tag::mux_select, 0, ClockTag::low, 1, 0, 0, 0x00, 0});
     card.store_tables();
     for (std::uint8_t unit = 0; unit < 3; ++unit) {
         card.put_pin(20U + unit, {pin_number::encoder::a, false, Tag::muxed_encoder, unit});
     }
-    card.put_pin(23, {1, true, Tag::mux_select, PinDescriptor::all_units});
+    card.put_pin(23, {1, true, Tag::mux_select, 6});
     SetupLink link(*opened.port);
     CardImage image = probe(link);
     ConfigString config;
@@ -214,6 +215,7 @@ TEST_F(ProbeTest, Uses_the_pins_of_half_as_many_units_as_multiplexed_encoders) {
     EXPECT_FALSE(image.pins[21].is_gpio);
     EXPECT_TRUE(image.pins[22].is_gpio);
     EXPECT_FALSE(image.pins[23].is_gpio);
+    EXPECT_TRUE(unused_modules(image).empty());
     config.parse("num_encoders=0");
     EXPECT_EQ(apply(config, image), "");
     EXPECT_TRUE(image.pins[20].is_gpio);

@@ -126,7 +126,7 @@ TEST(Pin, Functions_have_the_names_of_their_modules) {
     EXPECT_EQ(function_of(PinDescriptor::decode(0x0300c102)), "sserial.00.rx1");
     EXPECT_EQ(function_of(PinDescriptor::decode(0x0300c18b)), "sserial.00.txen0");
     EXPECT_EQ(function_of(PinDescriptor::decode(0x0300c301 | 0x80)), "ssr.00.out-00");
-    EXPECT_EQ(function_of(PinDescriptor::decode(0x03800d81)), "mux.select-0");
+    EXPECT_EQ(function_of(PinDescriptor::decode(0x03000d81)), "encoder.00.sel0");
     EXPECT_EQ(function_of(PinDescriptor::decode(0x03001386)), "3pwmgen.00.phase-C-inverted");
     EXPECT_EQ(function_of(PinDescriptor::decode(0x03011308)), "3pwmgen.01.fault");
     EXPECT_EQ(function_of(PinDescriptor::decode(0x03007701)), "module-0x77.00");

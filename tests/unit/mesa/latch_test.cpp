@@ -12,7 +12,7 @@ constexpr std::uint32_t settings = 1;
 constexpr std::uint32_t armed = settings | stepgen::latch_on_index;
 constexpr std::uint32_t event = settings | 0x12345600;
 
-/// A latch that has armed the index, in a datagram whose answer is not there yet.
+/// A latch that has armed the index, in a datagram that has no answer yet.
 struct StepLatchTest : testing::Test {
     StepLatch latch;
     StepLatchTest() {
