@@ -33,14 +33,22 @@ MODULES = {
     "DPLL": "dpll",
     "SSR": "ssr",
     "InM": "inm",
+    "InMux": "inmux",
+    "MuxedQCount": "muxed encoder",
+    "MuxedQCountSel": "encoder multiplexer",
     "OutM": "outm",
 }
-CHANNELS = {"7i92": 4, "7i76e": 2, "7i96s": 1}
+CHANNELS = {"7i92": 4, "7i76e": 2, "7i95": 2, "7i96s": 1}
 
 
 def mesaflash(card, *words):
+    """It waits for an answer for some ms, once: a busy host needs several attempts."""
     command = [MESAFLASH, "--device", card.upper(), "--addr", ADDRESS, *words]
-    return subprocess.run(command, capture_output=True, text=True, timeout=60).stdout
+    for _ in range(20):
+        text = subprocess.run(command, capture_output=True, text=True, timeout=60).stdout
+        if "board found" not in text:
+            break
+    return text
 
 
 def ours(command):
