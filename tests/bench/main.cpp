@@ -12,6 +12,9 @@
 #include "ethernet.hpp"
 #include "linuxcnc.hpp"
 #include "machine.hpp"
+#if HALCYON_PACKAGE_MESA
+#include "mesa.hpp"
+#endif
 #include "sample.hpp"
 #include "scocan.hpp"
 #include "tdma.hpp"
@@ -68,6 +71,9 @@ constexpr Section sections[] = {
      "50 EtherCAT drives over a veth pair against a plain socket program; start, faults, and how "
      "many slaves in memory",
      ethercat},
+#endif
+#if HALCYON_PACKAGE_MESA
+    {"mesa", "read and write of the driver of a Mesa card, against a bare UDP loop", mesa_card},
 #endif
     {"estimation", "a Kalman filter of 6 states and 3 measurements", estimation, true},
     {"vision", "markers in frames of 640 x 480: error and time", vision, true},
