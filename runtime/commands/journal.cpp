@@ -45,10 +45,11 @@ void command_journal(Context& context) {
     if (!parse_journal_line(context.command, context.diagnostics)) return;
     const SessionOptions& options = context.session.options();
     if (context.checking() || options.sink || options.virtual_clock) return;
-    context.diagnostics.warning("ignored-option", context.command.span,
-                                "this machine has no journal: it begins with the machine", "",
-                                "write the line into a netlist that hal run is given, or type: hal "
-                                "run --journal FILE.mcap");
+    context.diagnostics.warning(
+        "ignored-option", context.command.span,
+        "this machine has no journal: it begins with the machine", "",
+        "write the line into a netlist that hal run or hal linuxcnc is given, "
+        "or type: hal run --journal FILE.mcap");
 }
 
 }  // namespace hal

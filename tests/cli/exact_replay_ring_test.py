@@ -278,6 +278,14 @@ start
         self.finish(machine)
         self.assertIn("no difference", self.replay("inner.mcap"))
         self.assertIn("outer.hal", self.bad("run", path))  # it sources itself
+        # in a netlist that an INI file names
+        (self.folder / "part/a.ini").write_text("[HAL]\nHALFILE = named.hal\n")
+        (self.folder / "part/named.hal").write_text("journal named.mcap\n" + HEAP)
+        self.write("named.hal", "journal other.mcap\n")
+        machine = self.start("run", "part/a.ini")
+        self.wait_for_cycles(100)
+        self.finish(machine)
+        self.assertIn("no difference", self.replay("named.mcap"))
         for line, problem in [
             ("journal own.csv", "'own.csv' is not a valid name of a journal"),
             ("journal own.mcap keep=0.1s", "'keep=0.1s' is not a valid duration of a journal"),

@@ -123,6 +123,28 @@ class Linuxcnc(LinuxcncCase):
         (self.folder / "linked.ini").symlink_to(real / "machine.ini")
         self.assertEqual("", self.linuxcnc("linked.ini")[1])
 
+    def test_a_journal_is_written_and_executed_again(self):
+        ini = self.ini(PLAIN + "HALCMD = setp adder.in1 5\n")
+        self.display("until [ `halcmd getp servo.threadbeat` -gt 50 ]; do sleep 0.01; done")
+        out, err = self.linuxcnc("--journal", "run.mcap", ini)
+        self.assertRegex(err, r"^run\.mcap: \d+ cycles\n$|^\S*/run\.mcap: \d+ cycles\n$")
+        text = self.good("replay", "--exact", "run.mcap", "--until", "50", "--show", "adder.out")
+        self.assertTrue(text.endswith("stopped; no difference so far\nadder.out 7\n"), text)
+        self.assertIn("no difference\n", self.good("replay", "--exact", "run.mcap"))
+
+    def test_a_line_of_a_netlist_writes_a_journal(self):
+        (self.folder / "config").mkdir()
+        (self.folder / "config/machine.hal").write_text("source more.hal\n")
+        (self.folder / "config/more.hal").write_text("journal own.mcap keep=9s\n" + HALFILE)
+        (self.folder / "config/machine.ini").write_text(INI.replace("./ui", "../ui") + PLAIN)
+        self.display("until [ `halcmd getp servo.threadbeat` -gt 50 ]; do sleep 0.01; done")
+        out, err = self.linuxcnc("config/machine.ini")
+        self.assertRegex(err, r"^own\.mcap: the last 9 s of \d+ cycles\n$")
+        self.assertIn("no difference\n", self.good("replay", "--exact", "config/own.mcap"))
+        self.assertEqual([], list(self.folder.glob("**/own.mcap.ring")))
+        out, err = self.linuxcnc("--journal-keep", "5s", self.ini(), status=1)
+        self.assertEqual("hal linuxcnc: --journal-keep needs --journal FILE\n", err)
+
     def test_arguments_of_linuxcncrsh_come_before_the_ini_file(self):
         _, err = self.linuxcnc(
             self.ini(

@@ -16,6 +16,7 @@
 #include "machine/processes/programs.hpp"
 #include "run/fault_lines.hpp"
 #include "run/report.hpp"
+#include "run/run.hpp"
 #include "text/diagnostic.hpp"
 
 namespace hal::tools {
@@ -33,11 +34,12 @@ Words with_ini(const Words& program, const std::string& ini) {
 }  // namespace
 
 Launch::Launch(const LinuxcncOptions& options, const Configuration& configuration,
-               HostedMachine& machine, MachineLock& lock)
+               HostedMachine& machine, MachineLock& lock, RunJournal* journal)
     : options_(options),
       configuration_(configuration),
       machine_(machine),
       lock_(lock),
+      journal_(journal),
       programs_(options, configuration, machine),
       monitor_(configuration, machine, programs_) {
     machine_.ini_path = configuration.file;
@@ -379,6 +381,9 @@ void Launch::end() {
     step("unload everything");
     machine_.shell.execute(Words{"unload", "all"}, output_, "<linuxcnc>");
     programs_.wait_until_idle();
+    if (journal_) {
+        journal_->end_values();
+    }
     machine_.shut_down();
     programs_.end_orphans();
 }

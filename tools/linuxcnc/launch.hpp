@@ -15,10 +15,14 @@
 
 namespace hal::tools {
 
+class RunJournal;
+
 /// For one thread.
 class Launch {
 public:
-    Launch(const LinuxcncOptions&, const Configuration&, HostedMachine&, MachineLock&);
+    /// `journal`: of the machine; nullptr: none.
+    Launch(const LinuxcncOptions&, const Configuration&, HostedMachine&, MachineLock&,
+           RunJournal* journal);
     /// Returns the exit status, after end().
     int run();
 
@@ -57,6 +61,7 @@ private:
     const Configuration& configuration_;
     HostedMachine& machine_;
     MachineLock& lock_;
+    RunJournal* const journal_;
     ProcessOutput output_;
     LaunchPrograms programs_;
     LaunchMonitor monitor_;

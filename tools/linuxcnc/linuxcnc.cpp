@@ -4,13 +4,44 @@
 #include <unistd.h>
 
 #include "cli/output.hpp"
+#include "commands/files.hpp"
 #include "linuxcnc/configuration.hpp"
 #include "linuxcnc/launch.hpp"
 #include "linuxcnc/leftovers.hpp"
+#include "run/journal_option.hpp"
+#include "run/run_journal.hpp"
 
 namespace hal::tools {
 
 namespace {
+
+/// Returns what describes the journal to be written, without its netlist's line.
+RunOptions journal_options(const LinuxcncOptions& options, const Configuration& configuration) {
+    RunOptions journal;
+    static_cast<NetlistOptions&>(journal) = options;
+    journal.words = {configuration.file};
+    if (!options.journal.empty()) {
+        journal.journal = absolute_path(options.journal);  // the machine runs in another folder
+    }
+    journal.keep_ns = options.keep_ns;
+    return journal;
+}
+
+int launch(const LinuxcncOptions& options, const Configuration& configuration, MachineLock& lock,
+           RunJournal* journal) {
+    const std::string path = ::getenv("PATH");
+    LinuxcncOptions hosted = options;
+    hosted.max_gap_ns = configuration.max_gap_ns;
+    hosted.max_gap_realtime_ns = configuration.max_gap_realtime_ns;
+    HostedMachine machine(hosted, own_name(options), false,
+                          {.sink = journal ? &journal->sink() : nullptr});
+    ::setenv("PATH", path.c_str(), 1);  // a wrapper in the configuration's bin/ has precedence
+    if (!machine.serve(true)) return 1;
+    if (journal) {
+        if (const int failed = journal->begin(machine); failed != 0) return failed;
+    }
+    return Launch(options, configuration, machine, lock, journal).run();
+}
 
 int run_locked(const LinuxcncOptions& options, const Configuration& configuration) {
     MachineLock lock;
@@ -18,22 +49,19 @@ int run_locked(const LinuxcncOptions& options, const Configuration& configuratio
     if (lock.took_over()) {
         remove_segments(configuration);
     }
+    RunOptions journaled = journal_options(options, configuration);
     if (::chdir(configuration.folder.c_str()) != 0) {
         return fail(options, "cannot enter " + configuration.folder);
     }
     export_configuration(configuration, options);
     adopt_orphans();
-    int status = 1;
-    {
-        const std::string path = ::getenv("PATH");
-        LinuxcncOptions hosted = options;
-        hosted.max_gap_ns = configuration.max_gap_ns;
-        hosted.max_gap_realtime_ns = configuration.max_gap_realtime_ns;
-        HostedMachine machine(hosted, own_name(options), false);
-        ::setenv("PATH", path.c_str(), 1);  // a wrapper in the configuration's bin/ has precedence
-        if (!machine.serve(true)) return 1;
-        status = Launch(options, configuration, machine, lock).run();
+    add_journal_of_netlists(journaled);
+    if (journaled.keep_ns > 0 && journaled.journal.empty()) {
+        return fail(options, "--journal-keep needs --journal FILE");
     }
+    const int status = run_with_journal(journaled, [&](RunJournal* journal) {
+        return launch(options, configuration, lock, journal);
+    });
     remove_segments(configuration);
     return status;
 }

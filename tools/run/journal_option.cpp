@@ -16,7 +16,7 @@ namespace {
 /// Looks for the line in a netlist and in those that it sources, in the order of their commands.
 class JournalSearch {
 public:
-    JournalSearch(Sources& texts, const Ini& ini) : texts_(texts), ini_(ini) {}
+    JournalSearch(Sources& texts, Ini ini) : texts_(texts), ini_(std::move(ini)) {}
 
     /// `beside`: the netlist that sources it, or "".
     std::optional<JournalLine> find(const std::string& name, const std::string& beside) {
@@ -41,12 +41,24 @@ public:
         return std::nullopt;
     }
 
+    /// Looks in the netlists of [HAL]HALFILE, as the machine finds them.
+    std::optional<JournalLine> find_in_ini(const std::string& path) {
+        Diagnostics reported_when_run;
+        ini_ = Ini::read(texts_, path, reported_when_run);
+        directory_ = folder_of(path);
+        for (const std::string& entry : ini_.all("HAL", "HALFILE")) {
+            const std::string name = entry.substr(0, entry.find_first_of(" \t"));
+            if (auto line = find(name, path)) return line;
+        }
+        return std::nullopt;
+    }
+
 private:
     /// As the command `source` finds it.
-    static bool read(const std::string& name, const std::string& beside, std::string& path,
-                     std::string& text) {
+    bool read(const std::string& name, const std::string& beside, std::string& path,
+              std::string& text) const {
         std::string ignored;  // loading it reports it
-        if (read_netlist(name, "", path, text, ignored)) return true;
+        if (read_netlist(name, directory_, path, text, ignored)) return true;
         path = resolve_path(name, folder_of(beside));
         return !beside.empty() && read_text_file(path, text, ignored);
     }
@@ -56,7 +68,8 @@ private:
     }
 
     Sources& texts_;
-    const Ini& ini_;
+    Ini ini_;
+    std::string directory_;
     std::set<std::string> searched_;
 };
 
@@ -70,9 +83,9 @@ void add_journal_of_netlists(RunOptions& options) {
     if (!options.ini.empty()) {
         ini = Ini::read(texts, options.ini, reported_when_run);
     }
-    JournalSearch search(texts, ini);
     for (const std::string& path : options.words) {
-        const auto line = search.find(path, "");
+        JournalSearch search(texts, ini);
+        const auto line = path.ends_with(".ini") ? search.find_in_ini(path) : search.find(path, "");
         if (!line) continue;
         options.journal = line->file;
         options.keep_ns = options.keep_ns > 0 ? options.keep_ns : line->keep_ns;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The journal that `hal run` writes: of --journal, or of the line `journal FILE` of a netlist.
+// The journal that `hal run` and `hal linuxcnc` write: of --journal, or of the line `journal FILE` of
+// a netlist.
 #pragma once
 
 #include "run/run.hpp"
@@ -7,7 +8,8 @@
 namespace hal::tools {
 
 /// Sets journal and keep_ns to those of the first netlist with such a line, unless --journal is
-/// given. Lines of files that a netlist sources are not found: loading them warns.
+/// given: of the netlists that are given, those of [HAL]HALFILE of an INI file, and those that they
+/// source.
 void add_journal_of_netlists(RunOptions& options);
 
 }  // namespace hal::tools

@@ -230,7 +230,12 @@ private:
 int run_journaled(const RunOptions& given) {
     RunOptions options = given;
     add_journal_of_netlists(options);
-    if (options.journal.empty()) return run_run(options);
+    return run_with_journal(
+        options, [&options](RunJournal* journal) { return run_machine(options, journal); });
+}
+
+int run_with_journal(const RunOptions& options, const std::function<int(RunJournal*)>& run) {
+    if (options.journal.empty()) return run(nullptr);
     if (!options.journal.ends_with(".mcap")) {
         return fail(options, fmt::format("--journal: unknown format of '{}'; name the file .mcap",
                                          options.journal));
@@ -249,7 +254,7 @@ int run_journaled(const RunOptions& given) {
     }
     FileOfRun journal(options);
     if (const int status = journal.check(); status != 0) return status;
-    const int status = run_machine(options, &journal);
+    const int status = run(&journal);
     const int end_status = journal.end();
     return status != 0 ? status : end_status;
 }
