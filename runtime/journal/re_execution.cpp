@@ -440,6 +440,14 @@ void ReExecution::ignore_state() {
     }
 }
 
+void ReExecution::pass_difference() {
+    if (state_ != State::differs) return;
+    state_ = State::goes_on;
+    diverged_ = newest_;
+    accept_differences();
+    ignore_state();
+}
+
 void ReExecution::continue_in_copy() {
     hal::continue_in_copy();
     for (auto& [number, cursor] : cursors_) {

@@ -80,6 +80,8 @@ public:
     std::string edit_at_rest(const std::function<std::string()>& edit);
     /// From now on cycles may differ from the journaled ones, and only the first one is noted.
     void accept_differences() { accepts_differences_ = true; }
+    /// Goes on behind the first cycle that differs, accepting differences.
+    void pass_difference();
     /// The machine has been changed: what the journal has of its state is of another one.
     void ignore_state();
     /// Returns the first cycle that differed after accept_differences().

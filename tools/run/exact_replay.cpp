@@ -62,6 +62,10 @@ public:
         if (!options_.cut.empty() && status == 0) {
             status = cut();
         }
+        // last: the machine is behind the difference afterwards
+        if (!print(machine_.later_difference())) {
+            status = 1;
+        }
         execution_.finish();
         return status;
     }

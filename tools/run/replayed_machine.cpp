@@ -135,7 +135,22 @@ std::string ReplayedMachine::difference() const {
         "first difference: cycle {} of thread '{}' at {:.6f} s {}\n{}", at.number, at.thread,
         seconds(at.time_ns),
         reads ? "reads another number of inputs" : "has values with another checksum",
-        values_ ? "" : "to have the value named, write the journal with: --values '*'\n");
+        values_ ? "no recorded value of this cycle or before differs\n"
+                : "to have the value named, write the journal with: --values '*'\n");
+}
+
+std::string ReplayedMachine::later_difference() {
+    constexpr std::uint64_t max_cycles = 20'000;
+    if (!values_ || execution_.state() != ReExecution::State::differs || value_difference()) {
+        return "";
+    }
+    execution_.pass_difference();
+    const std::uint64_t end = execution_.cycles() + max_cycles;
+    while (execution_.cycles() < end && advance()) {
+    }
+    compare();
+    const ValueDifference* const at = value_difference();
+    return at ? value_text(*at, "first recorded value that differs") : "";
 }
 
 std::string ReplayedMachine::value_text(const ValueDifference& at, const char* title) const {

@@ -49,6 +49,9 @@ public:
     const ValueDifference* value_difference() const;
     /// Names the first difference; "" when there is none.
     std::string difference() const;
+    /// After a difference that no recorded value names: executes further cycles until one differs.
+    /// Returns what names it; "" when none does.
+    std::string later_difference();
     /// Returns the pin that the value is computed for; nullptr: no component computes it.
     const Pin* writer(const std::string& name) const;
     /// Returns the function that computes this value; nullptr: unknown.
