@@ -238,10 +238,8 @@ class Live(Case):
         first.stdin.flush()
         self.write("in.txt", "2 0\n")
         rejected = f"stream 'streamer.0' is fed by process {first.pid} already"
-        wait_until(
-            lambda: rejected in self.run_program("play", "0", "in.txt").stderr,
-            "the first one feeds it",
-        )
+        # not by trying: a second one that is earlier would feed it itself
+        self.comes("streamer.0.pin.0", "1")
         self.assertIn(rejected, self.bad("play", "0", "in.txt"))
         first.communicate(timeout=60)
         self.assertEqual(0, first.returncode)
