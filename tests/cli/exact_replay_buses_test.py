@@ -15,8 +15,9 @@ from harness import HAL, ROOT, SANITIZED, Case, needs_package, wait_until
 
 AXIS = ROOT / "halfiles" / "canopen-axis"
 
-# The master and its drive are in two threads, on a bus that loses frames.
-TWO_THREADS = """loadrt threads name1=fast period1=500000 name2=servo period2=1000000
+# The master and its drive are in two threads, on a bus that loses frames. Real-time threads of other
+# tests on the same CPU must not starve one of them, nor may a host that is suspended for 100 ms stop it.
+TWO_THREADS = """loadrt threads name1=fast period1=500000 policy1=other supervise1=60s name2=servo period2=1000000 policy2=other supervise2=60s
 loadrt canopen config=axis.canopen
 loadrt canopen_drive link=sim:axis id=2
 loadrt can_faults link=sim:axis faults=loss:every=50
