@@ -193,6 +193,52 @@ TEST(Discipline, Gives_up_on_a_reference_that_moves_with_the_clock) {
     EXPECT_FALSE(discipline.in_vain());
 }
 
+/// As a follower measures it, within half a period.
+std::int64_t folded(double error_ns, double period_ns) {
+    return std::llround(std::remainder(error_ns, period_ns));
+}
+
+TEST(Discipline, Distinguishes_a_reference_with_another_period_from_a_feedback_loop) {
+    for (const double drift : {15e-3, -15e-3, 0.1, 0.3}) {
+        Reference reference{.drift = drift, .noise_ns = 2000};
+        Discipline discipline;
+        const auto follow = [&](int events) {
+            bool vain = false;
+            for (int i = 0; i < events; ++i) {
+                const std::int64_t error =
+                    folded(static_cast<double>(reference.seen()), reference.period_ns);
+                reference.pass(discipline.follow(error, 1'000'000));
+                vain = vain || discipline.in_vain();
+            }
+            return vain;
+        };
+        EXPECT_FALSE(follow(5000)) << drift;
+        EXPECT_FALSE(discipline.locked()) << drift;
+        reference.drift = 200e-6;
+        EXPECT_FALSE(follow(1000)) << drift;
+        EXPECT_TRUE(discipline.locked()) << drift << ": its period is right";
+        EXPECT_NEAR(discipline.rate(), 200e-6, 100e-6) << drift;
+    }
+}
+
+TEST(Discipline, Follows_a_reference_that_no_longer_moves_with_the_clock) {
+    Discipline discipline;
+    for (int i = 0; i < 10'000; ++i) {
+        discipline.follow(250'000, 1'000'000);
+    }
+    ASSERT_TRUE(discipline.in_vain());
+    Reference other{.drift = 5e-3, .noise_ns = 2000};
+    for (int i = 0; i < 100; ++i) {
+        other.pass(discipline.follow(folded(static_cast<double>(other.seen()), 1e6), 1'000'000));
+    }
+    EXPECT_FALSE(discipline.in_vain());
+    other.drift = 200e-6;
+    for (int i = 0; i < 1000; ++i) {
+        other.pass(discipline.follow(folded(static_cast<double>(other.seen()), 1e6), 1'000'000));
+    }
+    EXPECT_TRUE(discipline.locked());
+}
+
 TEST(Discipline, Does_not_give_up_on_a_reference_with_much_noise) {
     Reference reference{.noise_ns = 80'000};
     Discipline discipline({.lock_ns = 10'000});

@@ -83,6 +83,11 @@ struct DisciplineOptions {
 /// and noise falls with every further one. s is the mean size of the residuals: the residual of a
 /// delayed event is limited to four times that; four such events in a row on one side are a phase
 /// jump of the reference, which is adopted at once while the rate is kept. There is no dead band.
+///
+/// When adjustments of two periods in total have not reduced the error, none is made for some
+/// events. An error that stays the same then is that of a feedback loop; one that moves faster than
+/// `max_rate` is that of a reference with another period, which is followed again once its rate is
+/// within the limit.
 /// Source: Brookner, Tracking and Kalman Filtering Made Easy, 1.2.6 (growing memory), 1.2.10
 /// (limits on noise); the clipping is Huber's.
 class Discipline {
@@ -96,6 +101,10 @@ public:
                         std::int64_t limit_ns = 0) noexcept {
         const auto error = static_cast<double>(error_ns);
         const auto period = static_cast<double>(period_ns);
+        if (state_ != State::following) {
+            observe(error_ns, period, limit_ns);
+            return 0;
+        }
         double residual = error - phase_;
         if (events_ == 0) {
             phase_ = error;
@@ -128,18 +137,21 @@ public:
         }
         error_ns_ = error_ns;
         judge(std::abs(error), period);
-        if (in_vain_) return 0;
         const std::int64_t step = advance(period, limit_ns);
         // noise of the rate does not add up
         pulled_ = locked_ ? 0 : pulled_ * (1 - 1.0 / 256) + static_cast<double>(step) - drift_;
-        in_vain_ = std::abs(pulled_) > 2 * period;
+        if (std::abs(pulled_) > 2 * period) {
+            // the last step moves the error of the next event, which begins the observation
+            state_ = State::stopped;
+        }
         return step;
     }
 
     /// Continues at the estimated rate after a missing event. Returns the adjustment to apply now.
     /// [realtime]
     std::int64_t coast(std::int64_t period_ns, std::int64_t limit_ns = 0) noexcept {
-        return events_ < 2 || in_vain_ ? 0 : advance(static_cast<double>(period_ns), limit_ns);
+        if (events_ < 2 || state_ != State::following) return 0;
+        return advance(static_cast<double>(period_ns), limit_ns);
     }
 
     /// Unlocks after loss of the reference. The next event starts a new acquisition from the last
@@ -151,16 +163,17 @@ public:
         beyond_ = 0;
         judged_ = 0;
         pulled_ = 0;
-        locked_ = in_vain_ = false;
+        state_ = State::following;
+        locked_ = false;
     }
 
     /// True after 16 consecutive events whose mean error is within `lock_ns`; false again at twice
     /// that error. [any]
     bool locked() const noexcept { return locked_; }
     /// True for a feedback loop: adjustments of two periods in total have not reduced the error,
-    /// since this clock itself drives the reference. No more adjustments are made until lose().
-    /// [any]
-    bool in_vain() const noexcept { return in_vain_; }
+    /// since this clock itself drives the reference. No more adjustments are made until lose(), or
+    /// until the reference moves by itself. [any]
+    bool in_vain() const noexcept { return state_ == State::in_vain; }
     /// measured error of the last event
     std::int64_t error_ns() const noexcept { return error_ns_; }
     double scatter_ns() const noexcept { return scatter_; }  ///< mean residual
@@ -168,6 +181,54 @@ public:
     double rate() const noexcept { return rate_; }
 
 private:
+    enum class State : std::uint8_t {
+        following,
+        // without adjustments:
+        stopped,  ///< they had no effect
+        observing,  ///< whether the error moves by itself
+        in_vain,  ///< it does not: a feedback loop
+        too_fast,  ///< faster than `max_rate`, in either direction
+    };
+
+    /// Decides every `observed_max` events what the reference does without adjustments.
+    void observe(std::int64_t error_ns, double period, std::int64_t limit_ns) noexcept {
+        const auto moved = static_cast<double>(error_ns - error_ns_);
+        error_ns_ = error_ns;
+        if (state_ == State::stopped) {
+            state_ = State::observing;
+            return begin_observation();
+        }
+        // The caller folds errors into a period of its thread, which is at least 10 limits: more
+        // than a quarter of that is a fold, or too fast anyway.
+        const double max_move = limit_ns > 0 ? 2.5 * static_cast<double>(limit_ns) : period / 4;
+        ++observed_;
+        if (std::abs(moved) < max_move) {
+            moved_ += moved;
+            ++moves_;
+        }
+        if (observed_ < observed_max) return;
+        decide(period);
+        begin_observation();
+    }
+    void begin_observation() noexcept {
+        moved_ = 0;
+        observed_ = 0;
+        moves_ = 0;
+    }
+    void decide(double period) noexcept {
+        const bool is_measured = 2 * moves_ > observed_;
+        const double drift = is_measured ? moved_ / moves_ : 0;
+        if (!is_measured || std::abs(drift) > options_.max_rate * period) {
+            state_ = State::too_fast;
+        } else if (state_ == State::observing) {
+            state_ = State::in_vain;
+        } else if (state_ == State::too_fast) {
+            lose();
+            drift_ = drift;
+            rate_known_ = true;
+        }
+        rate_ = is_measured ? drift / period : 0;
+    }
     std::int64_t advance(double period, std::int64_t limit_ns) noexcept {
         drift_ = std::clamp(drift_, -options_.max_rate * period, options_.max_rate * period);
         rate_ = drift_ / period;
@@ -193,11 +254,15 @@ private:
     double events_ = 0;  // n
     double pulled_ = 0;  // adjustments beyond the drift since the last lock
     bool rate_known_ = false;  // kept from before the loss of the reference
+    static constexpr int observed_max = 32;
+    State state_ = State::following;
+    double moved_ = 0;  // sum of the moves of the error, while there are no adjustments
+    int observed_ = 0;  // events since the last decision
+    int moves_ = 0;  // of them, those in moved_
     int beyond_ = 0;  // consecutive residuals beyond the gate, with their sign
     int judged_ = 0;
     std::int64_t error_ns_ = 0;
     bool locked_ = false;
-    bool in_vain_ = false;
 };
 
 }  // namespace hal
