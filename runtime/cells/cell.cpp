@@ -193,7 +193,7 @@ bool Cell::start(Output& output) {
     }
     std::vector<SimulatedLinks::Node> nodes;
     for (std::size_t i = 0; i < size(); ++i) {
-        nodes.push_back({nodes_[i].name, machines_[i].session.get()});
+        nodes.push_back({nodes_[i].name, machines_[i].session.get(), nodes_[i].deadline()});
     }
     links_.emplace(std::move(nodes), topics_);
     return good;

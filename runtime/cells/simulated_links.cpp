@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "base/types.hpp"
+#include "hal/age.hpp"
 
 namespace hal {
 namespace {
@@ -30,7 +31,10 @@ std::string thread_of(const NodeTopic& topic, std::size_t reader, const Model& m
 }  // namespace
 
 SimulatedLinks::SimulatedLinks(std::vector<Node> nodes, const std::vector<NodeTopic>& topics)
-    : nodes_(std::move(nodes)), topics_(topics), sent_(topics.size()) {
+    : nodes_(std::move(nodes)), topics_(topics), is_alive_(nodes_.size()), sent_(topics.size()) {
+    for (const Node& node : nodes_) {
+        had_threads_.push_back(!node.session->model().threads.empty());
+    }
     for (std::size_t reader = 0; reader < nodes_.size(); ++reader) {
         for (std::size_t other = 0; other < nodes_.size(); ++other) {
             if (other == reader) continue;
@@ -51,6 +55,10 @@ SimulatedLinks::SimulatedLinks(std::vector<Node> nodes, const std::vector<NodeTo
 
 void SimulatedLinks::update(std::int64_t now_ns, std::int64_t step_ns) {
     now_ns_ = now_ns;
+    for (std::size_t i = 0; i < nodes_.size(); ++i) {
+        const auto lock = nodes_[i].session->lock();
+        is_alive_[i] = !had_threads_[i] || !nodes_[i].session->model().threads.empty();
+    }
     for (std::size_t i = 0; i < topics_.size(); ++i) {
         sent_[i] = is_due(topics_[i], step_ns) ? values_of(topics_[i]) : std::nullopt;
     }
@@ -80,36 +88,62 @@ std::optional<SimulatedLinks::Values> SimulatedLinks::values_of(const NodeTopic&
 }
 
 void SimulatedLinks::update(Partner& partner, std::int64_t step_ns, Writes& writes) {
-    const Session& reader = *nodes_[partner.reader].session;
-    const bool runs = reader.threads().running();
+    const bool runs =
+        nodes_[partner.reader].session->threads().running() && is_alive_[partner.reader];
     if (!runs) {
         forget(partner, writes);
+    } else if (is_alive_[partner.other]) {
+        partner.seen_ns = now_ns_;
     }
-    bool online = runs;
-    bool shows_age = false;
-    double age_ms = runs ? 0.0 : std::numeric_limits<double>::infinity();
+    const bool all_valid = receive(partner, runs, writes);
+    const bool online = runs && all_valid && is_online(partner);
+    const double age = age_ms(partner);
+    const bool changes = online != partner.online;
+    if (changes) {
+        partner.online = online;
+        write(partner, "online", hal_value{.raw = online ? 1U : 0U}, writes);
+    }
+    const auto shows_age = [&](const Reception& reception) {
+        return is_due(*reception.topic, step_ns);
+    };
+    const bool is_shown =
+        changes || !runs || partner.receptions.empty() ||
+        std::any_of(partner.receptions.begin(), partner.receptions.end(), shows_age);
+    if (is_shown && age != partner.age_ms) {
+        partner.age_ms = age;
+        write(partner, "age-ms", hal_value{.real = age}, writes);
+    }
+}
+
+bool SimulatedLinks::receive(Partner& partner, bool runs, Writes& writes) {
+    bool all_valid = true;
     for (Reception& reception : partner.receptions) {
         const auto& values = sent_[static_cast<std::size_t>(reception.topic - topics_.data())];
         if (runs && values) {
             receive(partner, reception, *values, writes);
         }
         check_deadline(partner, reception, writes);
-        online = online && reception.valid;
-        shows_age = shows_age || is_due(*reception.topic, step_ns);
-        const bool has_values = reception.received_ns != never;
-        age_ms = std::max(age_ms, has_values
-                                      ? static_cast<double>(now_ns_ - reception.received_ns) * 1e-6
-                                      : std::numeric_limits<double>::infinity());
+        all_valid = all_valid && reception.valid;
     }
-    const bool changes = online != partner.online;
-    if (changes) {
-        partner.online = online;
-        write(partner, "online", hal_value{.raw = online ? 1U : 0U}, writes);
+    return all_valid;
+}
+
+bool SimulatedLinks::is_online(const Partner& partner) const {
+    if (!partner.receptions.empty()) return true;  // by its values
+    return partner.seen_ns != never &&
+           now_ns_ - partner.seen_ns <= nodes_[partner.other].deadline_ns;
+}
+
+double SimulatedLinks::age_ms(const Partner& partner) const {
+    const auto age_of = [this](std::int64_t since_ns) {
+        return since_ns == never ? infinite_age : static_cast<double>(now_ns_ - since_ns) * 1e-6;
+    };
+    if (partner.receptions.empty()) return age_of(partner.seen_ns);
+    double oldest = 0.0;
+    for (const Reception& reception : partner.receptions) {
+        oldest = std::max(oldest, age_of(reception.received_ns));
     }
-    if ((changes || shows_age || !runs) && age_ms != partner.age_ms) {
-        partner.age_ms = age_ms;
-        write(partner, "age-ms", hal_value{.real = age_ms}, writes);
-    }
+    return oldest;
 }
 
 void SimulatedLinks::receive(const Partner& partner, Reception& reception, const Values& values,
@@ -145,8 +179,9 @@ void SimulatedLinks::make_safe(const Partner& partner, Reception& reception, Wri
     }
 }
 
-/// The reader is stopped: what it received is invalid, without a fault.
+/// The reader is stopped, or its threads are deleted: what it received is invalid, without a fault.
 void SimulatedLinks::forget(Partner& partner, Writes& writes) {
+    partner.seen_ns = never;
     for (Reception& reception : partner.receptions) {
         if (reception.received_ns == never) continue;
         make_safe(partner, reception, writes);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // The signals between the nodes of a cell that `hal sim` runs in one process, on their common
 // virtual clock: values pass at the rate of their topic. A node whose thread does not run sends
-// nothing, so that the others find it offline after their deadline, as over DDS. [setup], one
-// thread.
+// nothing, so that the others find it offline after their deadline, as over DDS. A node whose
+// threads are deleted is like one whose process has ended. [setup], one thread.
 #pragma once
 
 #include <cstdint>
@@ -23,6 +23,7 @@ public:
     struct Node {
         std::string name;
         Session* session = nullptr;
+        std::int64_t deadline_ns = 0;  ///< of a node that sends nothing
     };
     /// Outlives the sessions, whose faults keep the address of its texts. Every node has the pins
     /// `node.OTHER.online`, `node.OTHER.age-ms` and, for each signal that it reads,
@@ -34,6 +35,7 @@ public:
     void update(std::int64_t now_ns, std::int64_t step_ns);
 
 private:
+    static constexpr std::int64_t never = std::numeric_limits<std::int64_t>::min();
     /// A topic as one of its readers receives it.
     struct Reception {
         const NodeTopic* topic = nullptr;
@@ -47,16 +49,22 @@ private:
         std::size_t reader = 0;
         std::size_t other = 0;
         std::deque<Reception> receptions = {};  ///< empty: `other` sends nothing to `reader`
+        std::int64_t seen_ns = never;  ///< when `other` was alive last
         bool online = false;
         double age_ms = std::numeric_limits<double>::infinity();
     };
     using Values = std::vector<std::optional<Reading>>;
     using Writes = std::vector<std::pair<Pin*, hal_value>>;
-    static constexpr std::int64_t never = std::numeric_limits<std::int64_t>::min();
 
     /// Returns the values of a topic, nothing while its node does not send.
     std::optional<Values> values_of(const NodeTopic& topic);
     void update(Partner& partner, std::int64_t step_ns, Writes& writes);
+    /// Receives the values that are due. Returns whether those of all topics are valid.
+    bool receive(Partner& partner, bool runs, Writes& writes);
+    bool is_online(const Partner& partner) const;
+    /// Returns the age of the oldest values of a partner, or of its last sign of life; infinite:
+    /// there is none.
+    double age_ms(const Partner& partner) const;
     void receive(const Partner& partner, Reception& reception, const Values& values,
                  Writes& writes);
     void check_deadline(const Partner& partner, Reception& reception, Writes& writes);
@@ -69,6 +77,8 @@ private:
 
     const std::vector<Node> nodes_;
     const std::vector<NodeTopic>& topics_;
+    std::vector<bool> had_threads_;  ///< by node: at the start
+    std::vector<bool> is_alive_;  ///< by node: its threads are not deleted
     std::vector<std::optional<Values>> sent_;  ///< by topic: what is due in this step
     std::deque<Partner> partners_;  ///< by reader
     std::int64_t now_ns_ = 0;

@@ -48,6 +48,20 @@ sets count -1
 net doubled twice.out
 """
 
+# `taker` sends nothing.
+ONE_WAY = """loadrt threads name1=servo period1=1000000
+
+node sender
+loadrt integ names=clock
+addf clock servo
+net count clock.out
+
+node taker deadline=100ms
+loadrt scale names=twice
+addf twice servo
+net count => twice.in
+"""
+
 TWO_THREADS = """loadrt threads name1=servo period1=1000000 name2=slow period2=10000000
 
 node desk deadline=1s
@@ -233,6 +247,29 @@ class Language(Case):
     def test_sim_finds_a_node_offline_whose_machine_is_unloaded(self):
         commands = ["sender: unload all", "all: advance 2s"]
         self.assertEqual("FALSE\n2000\n", self.sim(CELL, *commands, *self.state("taker", "sender")))
+
+    def test_sim_finds_others_offline_from_a_node_without_its_threads(self):
+        for command in ("sender: unload all", "sender: delthread servo"):
+            commands = [command, "all: advance 1ms", *self.state("sender", "taker")]
+            words = [word for one in commands for word in ("-e", one)]
+            path = self.write("cell.hal", CELL)
+            done = self.run_program("sim", path, "--for", "1s", "-q", *words)
+            self.assertEqual((0, "FALSE\ninf\n"), (done.returncode, done.stdout), command)
+
+    def test_sim_finds_a_node_that_sends_nothing_offline_without_its_threads(self):
+        shown = self.state("sender", "taker")
+        for command in ("taker: unload all", "taker: delthread servo"):
+            commands = [command, "all: advance 50ms", *shown, "all: advance 950ms", *shown]
+            words = [word for one in commands for word in ("-e", one)]
+            path = self.write("cell.hal", ONE_WAY)
+            done = self.run_program("sim", path, "--for", "1s", "-q", *words)
+            self.assertEqual(
+                (0, "TRUE\n50\nFALSE\n1000\n"), (done.returncode, done.stdout), command
+            )
+        again = ("taker: newthread servo 1000000", "taker: start", "all: advance 1ms")
+        self.assertEqual(
+            "TRUE\n0\n", self.sim(ONE_WAY, "taker: unload all", "all: advance 1s", *again, *shown)
+        )
 
     def test_sim_that_waits_for_a_program_can_be_interrupted(self):
         self.write("wait.sh", "touch started\nexec sleep 60\n")
