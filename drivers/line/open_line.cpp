@@ -43,6 +43,12 @@ Description describe(std::string_view address) {
     return link::describe_address<Opened, Options, Description>(address, line_drivers);
 }
 
+std::string listening_address(std::string_view address) {
+    constexpr std::string_view prefix = "tcp:";
+    if (!address.starts_with(prefix)) return {};
+    return "listen:" + tcp::with_port(std::string(address.substr(prefix.size())));
+}
+
 bool parse_format(std::string_view text, Options& options) {
     if (text.size() != 3 || text[0] != '8' || (text[2] != '1' && text[2] != '2')) return false;
     switch (text[1]) {

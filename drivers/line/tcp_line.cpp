@@ -2,7 +2,6 @@
 // A TCP connection as a line of bytes, from either side.
 #include "tcp_line.hpp"
 
-#include <arpa/inet.h>
 #include <netdb.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
@@ -19,6 +18,7 @@ namespace {
 
 constexpr std::int64_t retry_ns = 500'000'000;
 constexpr std::int64_t connect_ns = 1'000'000'000;
+constexpr std::uint16_t default_port = 502;  // of Modbus TCP
 
 void prepare(int fd) noexcept {
     const int on = 1;
@@ -141,15 +141,20 @@ private:
     link::Descriptor listener_;
 };
 
-}  // namespace
+struct SocketAddress {
+    sockaddr_storage bytes{};
+    socklen_t size = 0;
+    const sockaddr* get() const { return reinterpret_cast<const sockaddr*>(&bytes); }
+};
 
-Opened open(const std::string& target, const Options&) {
+/// Resolves HOST, HOST:PORT or [HOST]:PORT. Returns the problem, or "".
+std::string resolve(const std::string& target, const char* example, SocketAddress& address) {
     const auto colon = target.rfind(':');
     std::string host = target.substr(0, colon);
-    std::uint16_t port = 502;
+    std::uint16_t port = default_port;
     if (colon != target.npos &&
         (!parse_whole(std::string_view(target).substr(colon + 1), port) || port == 0)) {
-        return {nullptr, "invalid port '" + target.substr(colon + 1) + "'; write tcp:HOST:502"};
+        return "invalid port '" + target.substr(colon + 1) + "'; write " + example;
     }
     if (host.size() > 2 && host.front() == '[' && host.back() == ']') {
         host = host.substr(1, host.size() - 2);
@@ -158,32 +163,41 @@ Opened open(const std::string& target, const Options&) {
     hints.ai_socktype = SOCK_STREAM;
     addrinfo* found = nullptr;
     const int error = getaddrinfo(host.c_str(), std::to_string(port).c_str(), &hints, &found);
-    if (error != 0) return {nullptr, "unknown host '" + host + "': " + gai_strerror(error)};
-    sockaddr_storage peer{};
-    std::memcpy(&peer, found->ai_addr, found->ai_addrlen);
-    const socklen_t size = found->ai_addrlen;
+    if (error != 0) return "unknown host '" + host + "': " + gai_strerror(error);
+    std::memcpy(&address.bytes, found->ai_addr, found->ai_addrlen);
+    address.size = found->ai_addrlen;
     freeaddrinfo(found);
-    return {std::make_unique<ClientLine>(describe(target), peer, size), {}};
+    return {};
+}
+
+}  // namespace
+
+std::string with_port(const std::string& target) {
+    const bool has_port = target.rfind(':') != target.npos && !target.ends_with(']');
+    return has_port ? target : target + ":" + std::to_string(default_port);
+}
+
+Opened open(const std::string& target, const Options&) {
+    SocketAddress peer;
+    std::string problem = resolve(target, "tcp:HOST:502", peer);
+    if (!problem.empty()) return {nullptr, std::move(problem)};
+    return {std::make_unique<ClientLine>(describe(target), peer.bytes, peer.size), {}};
 }
 Description describe(const std::string& target) {
     return {.address = "tcp:" + target, .transport = "TCP connection", .is_stream = true};
 }
 
 Opened open_listener(const std::string& target, const Options&) {
-    std::uint16_t port = 0;
-    if (!parse_whole(target, port)) {
-        return {nullptr, "invalid port '" + target + "'; write listen:5020"};
-    }
-    link::Descriptor fd(::socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
+    const bool is_port = target.find(':') == target.npos;
+    SocketAddress own;
+    std::string problem = resolve(is_port ? "127.0.0.1:" + target : target, "listen:5020", own);
+    if (!problem.empty()) return {nullptr, std::move(problem)};
+    link::Descriptor fd(
+        ::socket(own.bytes.ss_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
     const int on = 1;
     setsockopt(fd.get(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
-    sockaddr_in own{};
-    own.sin_family = AF_INET;
-    own.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    own.sin_port = htons(port);
-    if (::bind(fd.get(), reinterpret_cast<const sockaddr*>(&own), sizeof own) != 0 ||
-        ::listen(fd.get(), 4) != 0) {
-        return {nullptr, "cannot listen on port " + target + ": " + link::reason()};
+    if (::bind(fd.get(), own.get(), own.size) != 0 || ::listen(fd.get(), 4) != 0) {
+        return {nullptr, "cannot listen: " + link::reason()};
     }
     return {std::make_unique<ServerLine>(describe_listener(target), std::move(fd)), {}};
 }

@@ -75,6 +75,9 @@ struct Opened {
 Opened open(std::string_view address, const Options& options = {});
 /// Describes the line that open() would return, without opening it. [setup]
 Description describe(std::string_view address);
+/// Returns the address on which to wait for a user that opens `address`: `listen:HOST:PORT` for a
+/// TCP connection; empty for lines that both ends open alike. [setup]
+std::string listening_address(std::string_view address);
 /// Parses 8N1, 8E1, 8O1, 8N2. Returns whether it is valid. [setup]
 bool parse_format(std::string_view text, Options& options);
 /// Returns "19200 8N1". [setup]

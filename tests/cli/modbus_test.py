@@ -7,7 +7,9 @@ import json
 import os
 import pty
 import signal
+import socket
 import subprocess
+import threading
 import time
 import tty
 import unittest
@@ -26,6 +28,8 @@ stop = coil 3 0
 profile = vfs11
 every = 100ms
 """
+
+TCP = BUS.replace("serial:line", "{line}")
 
 CONFIRM = "[bus]\nlink = sim:c\n[slave 3 meter]\nread a = holding 0\nconfirm = yes\n"
 
@@ -89,6 +93,8 @@ class Modbus(Case):
         self.assertEqual("0x0003  0\n", self.good("modbus", "read", line, "3", "coil", "3"))
         self.assertEqual("", self.good("modbus", "write", line, "3", "coil", "3", "1"))
         self.assertEqual("0x0003  1\n", self.good("modbus", "read", line, "3", "coil", "3"))
+        self.assertEqual("", self.good("modbus", "write", line, "0", "coil", "3", "0"))
+        self.assertEqual("0x0003  0\n", self.good("modbus", "read", line, "3", "coil", "3"))
         self.assertEqual(
             "hal modbus read: slave 3 rejects 'read holding 0x0500': illegal data address (exception 2)\n",
             self.bad("modbus", "read", line, "3", "holding", "0x500"),
@@ -109,12 +115,56 @@ class Modbus(Case):
 
     def test_by_hand_on_a_terminal(self):
         self.node("pty:line", "--set", "io.level=-12.5")
-        self.by_hand("serial:line?baud=38400")
+        line = "serial:line?baud=38400"
+        self.by_hand(line)
+        self.assertEqual(
+            "hal modbus read: slave 0 is the broadcast address, which no slave answers; write "
+            "1..247\n",
+            self.bad("modbus", "read", line, "0", "coil", "3"),
+        )
 
     def test_by_hand_on_tcp(self):
         port = 20000 + os.getpid() % 20000
         self.node(f"listen:{port}", "--set", "io.level=-12.5")
         self.by_hand(f"tcp:127.0.0.1:{port}")
+
+    def test_a_device_on_tcp_that_rejects_a_write_to_unit_0(self):
+        listener = socket.create_server(("127.0.0.1", 0))
+        self.addCleanup(listener.close)
+
+        def reject():
+            connection = listener.accept()[0]
+            with connection:
+                request = connection.recv(260)
+                connection.sendall(request[:4] + bytes.fromhex("0003 00 86 02"))
+
+        device = threading.Thread(target=reject)
+        device.start()
+        self.addCleanup(device.join)
+        line = f"tcp:127.0.0.1:{listener.getsockname()[1]}"
+        self.assertEqual(
+            "hal modbus write: slave 0 rejects 'write holding 0x0003': illegal data address "
+            "(exception 2)\n",
+            self.bad("modbus", "write", line, "0", "holding", "3", "1"),
+        )
+
+    def test_a_node_listens_on_the_tcp_line_of_its_file(self):
+        port = 22000 + os.getpid() % 20000
+        line = f"tcp:127.0.0.1:{port}"
+        self.write("tcp.modbus", TCP.format(line=line))
+        self.start("node", "modbus", "tcp.modbus", loaded=False)
+        wait_until(
+            lambda: self.run_program("modbus", "read", line, "3", "coil", "3").returncode == 0,
+            "the slaves of the file listen",
+        )
+        self.write("away.modbus", TCP.format(line="tcp:192.0.2.1:502"))
+        self.assertEqual(
+            "hal node modbus: listen:192.0.2.1:502: cannot listen: Cannot assign requested address; "
+            "the slaves listen where link = tcp:192.0.2.1:502 of the file connects to; for another "
+            "port of this computer write --link listen:5020, and load the machine with "
+            "link=tcp:127.0.0.1:5020\n",
+            self.bad("node", "modbus", "away.modbus"),
+        )
 
     def test_invalid_lines_and_faults(self):
         self.assertIn("write serial:/dev/ttyUSB0 for", self.bad("modbus", "scan", "usb0"))

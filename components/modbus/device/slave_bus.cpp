@@ -115,6 +115,7 @@ void SlaveBus::disturb(std::span<std::uint8_t> bytes, std::int64_t now_ns) {
 /// reaches all of them and is not answered.
 void SlaveBus::serve(const Found& found, std::int64_t now_ns) {
     if (found.unit == broadcast_unit) {  // a broadcast is not answered
+        ++requests_;
         for (EmulatedSlave& slave : slaves_) {
             slave.answer(found.pdu);
         }

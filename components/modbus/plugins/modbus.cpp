@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <bit>
 #include <deque>
+#include <optional>
 
 #include "bus/component/bus_component.hpp"
 #include "bus/guardian/program_path.hpp"
@@ -32,6 +33,10 @@ struct Modbus : hal::bus::BusComponent {
         reporter_ = std::make_unique<hal::Reporter<EventRecord>>(
             name_, [this](const EventRecord& record) { return line(record); }, 256,
             &EventTexts::subject);
+        if (!bus.broadcast_stop.empty()) {
+            broadcasts_.emplace(*this, receive_, "broadcasts",
+                                "how often the broadcast stop was sent; no slave acknowledges it");
+        }
         for (std::size_t n = 0; n < bus.slaves.size(); ++n) {
             slaves_.emplace_back(*this, receive_, transmit_, bus, arguments_.plan, n,
                                  SharedPins{set_points_, ages_});
@@ -355,6 +360,9 @@ private:
         fault = lasting_faults_ != 0;
         guarded = has_guardian_ && is_alive;
         telegrams = header.telegrams.load(std::memory_order_relaxed);
+        if (broadcasts_) {
+            *broadcasts_ = header.broadcasts.load(std::memory_order_relaxed);
+        }
         show_load(now, header.busy_ns.load(std::memory_order_relaxed));
     }
 
@@ -428,6 +436,7 @@ private:
     hal::Out<double> load{*this, receive_, "load",
                           "share of the time in which the line is busy, 0..1"};
     hal::Out<std::uint64_t> telegrams{*this, receive_, "telegrams", "requests that were answered"};
+    std::optional<hal::Out<std::uint32_t>> broadcasts_;  ///< with a broadcast stop
 
     std::unique_ptr<EventTexts> texts_;
     std::unique_ptr<hal::Reporter<EventRecord>> reporter_;

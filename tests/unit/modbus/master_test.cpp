@@ -669,6 +669,26 @@ TEST_F(BroadcastStop, Ends_on_a_line_that_accepts_nothing) {
     EXPECT_EQ(sent(broadcast), 0);
 }
 
+TEST(Master, A_broadcast_stop_is_a_request_to_unit_0_on_TCP) {
+    std::vector<std::string> frames;
+    World w(
+        "[bus]\nlink = sim:x\nprotocol = tcp\nbroadcast-stop = holding 50 7\n"
+        "[slave 1 a]\nread c = holding 50\n",
+        "", [&frames](std::unique_ptr<line::Line> line) {
+        return std::make_unique<RecordedLine>(std::move(line), frames);
+    });
+    w.run(second);
+    frames.clear();
+    w.image.stop(StopReason::estop);
+    w.run(second);
+    const auto is_broadcast = [](const std::string& frame) {
+        return frame.substr(5) == " 00 00 00 06 00 06 00 32 00 07";
+    };
+    EXPECT_EQ(std::count_if(frames.begin(), frames.end(), is_broadcast), 2);
+    EXPECT_EQ(w.image.header().broadcasts.load(), 2U);
+    EXPECT_EQ(w.slaves->slaves()[0].get(Table::holding, 50).value_or(-1), 7);
+}
+
 /// Returns the time from a stop to its end, on a line of this configuration without answers, behind
 /// the expected longest one.
 std::pair<std::int64_t, std::int64_t> time_of_stop(const std::string& text) {

@@ -33,6 +33,7 @@ public:
         timeout_ns_ = options.timeout_ns;
         const bool stream = line_->description().is_stream;
         framing_ = stream && !options.rtu ? Framing::tcp : Framing::rtu;
+        address_ = address;
         const std::int64_t limit = link::monotonic_ns() + 2'000'000'000;
         while (!line_->is_open(link::monotonic_ns())) {
             if (link::monotonic_ns() > limit) return address + ": no connection within 2 s";
@@ -46,7 +47,10 @@ public:
         std::uint8_t code = 0;
         std::vector<std::uint8_t> data;
         bool is_corrupt = false;
+        bool is_sent = false;
     };
+    Framing framing() const { return framing_; }
+    const std::string& address() const { return address_; }
 
     /// Sends a request and waits for its answer.
     Result ask(std::uint8_t unit, const Pdu& request) {
@@ -54,10 +58,11 @@ public:
         discard();
         const Frame sent = encode(framing_, unit, ++transaction_, request);
         bool echo_is_due = framing_ == Framing::rtu && request.function() <= 4;
-        line_->send(sent.span(), link::monotonic_ns());
+        Result result;
+        result.is_sent = line_->send(sent.span(), link::monotonic_ns());
+        if (!result.is_sent) return result;
         const std::int64_t limit =
             std::max(link::monotonic_ns(), line_->sent_until_ns()) + timeout_ns_;
-        Result result;
         while (link::monotonic_ns() < limit) {
             wait(limit - link::monotonic_ns());
             buffer.added(line_->receive(buffer.free_space(), link::monotonic_ns()));
@@ -101,6 +106,7 @@ private:
     }
 
     std::unique_ptr<line::Line> line_;
+    std::string address_;
     Framing framing_ = Framing::rtu;
     std::int64_t timeout_ns_ = 0;
     std::uint16_t transaction_ = 0;
@@ -116,7 +122,9 @@ struct Target {
 std::string parse_target(const std::vector<std::string>& words, Target& target) {
     if (words.size() < 4) return "missing argument; write LINE SLAVE TABLE ADDRESS";
     const auto unit = parse_natural(words[1]);
-    if (!unit || *unit > 255) return "invalid slave '" + words[1] + "'; write 1..247";
+    if (!unit || *unit > 255) {
+        return "invalid slave '" + words[1] + "'; write 1..247, or 0 to write to all slaves";
+    }
     const std::string table = lower(words[2]);
     for (const Table one : {Table::coil, Table::discrete, Table::holding, Table::input}) {
         if (table == modbus::to_string(one)) {
@@ -135,8 +143,11 @@ std::string parse_target(const std::vector<std::string>& words, Target& target) 
     return {};
 }
 
-int report(const Options& options, const Exchange::Result& result, const Pdu& request,
-           std::uint8_t unit) {
+int report(const Options& options, const Exchange& exchange, const Exchange::Result& result,
+           const Pdu& request, std::uint8_t unit) {
+    if (!result.is_sent) {
+        return fail(options, exchange.address() + " is lost or does not accept the request");
+    }
     if (result.verdict == Verdict::exception) {
         return fail(options,
                     fmt::format("slave {} rejects '{}': {} (exception {})", unit,
@@ -227,8 +238,15 @@ int run_modbus_read(const ModbusAccessOptions& options) {
     if (const std::string problem = exchange.open(options.words[0], options); !problem.empty()) {
         return fail(options, problem);
     }
+    // over TCP it may be the device itself
+    if (target.unit == broadcast_unit && exchange.framing() == Framing::rtu) {
+        return fail(options,
+                    "slave 0 is the broadcast address, which no slave answers; write 1..247");
+    }
     const auto result = exchange.ask(target.unit, request);
-    if (result.verdict != Verdict::good) return report(options, result, request, target.unit);
+    if (result.verdict != Verdict::good) {
+        return report(options, exchange, result, request, target.unit);
+    }
     return exit_code(print(values_text(target, number, result.data)));
 }
 
@@ -245,8 +263,11 @@ int run_modbus_write(const ModbusAccessOptions& options) {
     }
     if (!problem.empty()) return fail(options, problem);
     const auto result = exchange.ask(target.unit, request);
-    if (target.unit == 0) return 0;  // a broadcast is not answered
-    return result.verdict == Verdict::good ? 0 : report(options, result, request, target.unit);
+    const bool is_answered = result.verdict != Verdict::foreign || result.is_corrupt;
+    // a broadcast is not answered, but over TCP it may be a request to the device itself
+    if (target.unit == broadcast_unit && result.is_sent && !is_answered) return 0;
+    if (result.verdict == Verdict::good) return 0;
+    return report(options, exchange, result, request, target.unit);
 }
 
 int run_modbus_scan(const ModbusScanOptions& options) {

@@ -46,6 +46,25 @@ std::string apply_setting(SlaveBus& bus, const std::string& text) {
     return {};
 }
 
+/// Opens the line on which the slaves answer: that of --link, or the end of that of the file at
+/// which they are.
+line::Opened open_line(const ModbusNodeOptions& options, const Bus& bus, std::string& link) {
+    const std::string listening = line::listening_address(bus.link);
+    if (!options.link.empty()) {
+        link = options.link;
+    } else {
+        link = listening.empty() ? bus.link : listening;
+    }
+    auto opened = line::open(link, bus.line);
+    if (!opened && options.link.empty() && !listening.empty()) {
+        opened.problem +=
+            "; the slaves listen where link = " + bus.link +
+            " of the file connects to; for another port of this computer write --link "
+            "listen:5020, and load the machine with link=tcp:127.0.0.1:5020";
+    }
+    return opened;
+}
+
 /// Prints drives whose state has changed.
 class DriveReport {
 public:
@@ -76,7 +95,6 @@ private:
 int run_node_modbus(const ModbusNodeOptions& options) {
     ReadResult result;
     if (!read_modbus_file(options, options.words[0], result)) return 1;
-    const std::string& link = options.link.empty() ? result.bus.link : options.link;
     SlaveBus bus(result.bus);
     for (const std::string& text : options.faults) {
         SlaveFault fault;
@@ -91,7 +109,8 @@ int run_node_modbus(const ModbusNodeOptions& options) {
         }
     }
     StopRequest stop;
-    auto opened = line::open(link, result.bus.line);
+    std::string link;
+    auto opened = open_line(options, result.bus, link);
     if (!opened) return fail(options, opened.problem);
     bus.set_thinking(options.thinking_ns);
     bus.attach(*opened.line);

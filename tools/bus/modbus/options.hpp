@@ -44,7 +44,8 @@ struct ModbusAccessOptions : ModbusLineOptions {
     void declare(OptionSet& set) override {
         set.words("LINE SLAVE TABLE ADDRESS [COUNT | VALUE…]",
                   "the line, as in serial:/dev/ttyUSB0?baud=9600&format=8E1 or tcp:HOST:502; the "
-                  "slave, 1..247; coil, discrete, holding or input; an address on the wire; of "
+                  "slave, 1..247, or 0 to write to all; coil, discrete, holding or input; an "
+                  "address on the wire; of "
                   "read a count, of write the values");
         declare_line(set);
     }
@@ -94,7 +95,7 @@ struct ModbusNodeOptions : Options {
         set.word("FILE", "configuration of a bus, NAME.modbus");
         set.value("--link", link, "ADDRESS",
                   "the line: pty:/tmp/modbus, listen:5020, serial:/dev/ttyUSB1; default: that of "
-                  "the file");
+                  "the file, whose tcp:HOST:PORT is listened on");
         set.values("--fault", faults, "FAULT",
                    "silence, late, corrupt, wrong-unit, exception or half, with options: "
                    "late:unit=2:every=50:late=120ms:from=1s:for=2s; may be repeated");
