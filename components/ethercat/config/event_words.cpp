@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <cstdlib>
 #include <iterator>
 #include <string_view>
 
@@ -169,9 +170,12 @@ std::string rejected_mapping_words(std::int64_t first, std::int64_t code, bool l
 
 std::string state_words(std::int64_t state) { return to_string(static_cast<State>(state & 0x0f)); }
 
+/// Three digits, and all of them before the point.
 std::string microseconds(std::int64_t ns) {
+    constexpr std::int64_t whole_above_ns = 999'500;
     char text[32];
-    std::snprintf(text, sizeof text, "%.3g us", static_cast<double>(ns) * 1e-3);
+    const double us = static_cast<double>(ns) * 1e-3;
+    std::snprintf(text, sizeof text, ns < whole_above_ns ? "%.3g us" : "%.0f us", us);
     return text;
 }
 
@@ -295,6 +299,11 @@ constexpr bus::EventRow<Event> event_rows[] = {
      " is out of step, its clock deviates by more than 2.1 s{outputs_off}"},
     {Event::dc_recovered, Effect::ends,
      "{who} has a clock within the window again, after {second} ms"},
+    {Event::dc_jumped, Effect::raises, "{who}[ {jump}]",
+     " has the reference clock, which jumped by {us}; the clocks behind it are out of "
+     "step{jumped_outputs}"},
+    {Event::dc_jump_ended, Effect::ends,
+     "the clocks behind {who} are within the window again, {second} ms after its clock jumped"},
     {Event::dc_synchronised, Effect::none,
      "all clocks are synchronised, largest deviation {deviation}"},
     {Event::ring_broken, Effect::none,
@@ -402,6 +411,20 @@ std::string lost_clock(const Source& s) {
            "has jumped. To set the clocks again: stop, then start";
 }
 
+std::string jumped_clock(const Source& s) {
+    const std::string jump =
+        "has the reference clock, which jumped by " + microseconds(std::abs(s.first())) +
+        "; the clocks behind it deviate by more than " + microseconds(s.second()) + ": ";
+    if (s.setup.dc_loss == master::DcLoss::safeop) {
+        return jump +
+               "their slaves are taken to SAFE-OP until they are within the window again; check "
+               "its supply";
+    }
+    return jump +
+           "check its supply, and the manuals of the slaves for what they do without "
+           "synchronisation. To set the clocks again: stop, then start";
+}
+
 std::string staleness(const Source& s) {
     switch (static_cast<master::Staleness>(s.first())) {
     case master::Staleness::late:
@@ -480,6 +503,13 @@ constexpr Value values[] = {
     {"cable", [](const Source& s) { return cable_words(s.first(), s.setup, s.link); }},
     {"emergency", [](const Source& s) { return emergency_words(s.first(), s.second()); }},
     {"clock", lost_clock},
+    {"jump", jumped_clock},
+    {"jumped_outputs",
+     [](const Source& s) {
+    return std::string(s.setup.dc_loss == master::DcLoss::safeop
+                           ? "; their outputs are off until they are in step again"
+                           : "; to set them again: stop, then start");
+}},
     {"break",
      [](const Source& s) {
     return s.what.slave == Events::bus

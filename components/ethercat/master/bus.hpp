@@ -10,6 +10,7 @@
 #include <atomic>
 #include <bitset>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "ethercat/master/bus_slave.hpp"
@@ -39,6 +40,7 @@ struct Device {
     bool synchronised = false;  ///< its clock was within the window
     bool drifted = false;  ///< it was reported as not in step, while it is operational
     std::int64_t drifts_since_ns = 0;  ///< when its clock left the window; 0: it is there
+    bool follows_jump = false;  ///< it left the window because the reference clock jumped
     bool settled = false;  ///< a start-up brought it to the state that the setup names
     bool in_op = false;  ///< settled in OP
     bool stale = false;  ///< its process data is not exchanged
@@ -90,6 +92,11 @@ struct Bus {
     std::int64_t epoch_ns = 0;
     /// system time minus the clock of the cycle, by the newest frame; 0: not known
     std::int64_t skew_ns = 0;
+    /// `skew_ns` when no clock was beyond the window
+    std::optional<std::int64_t> agreed_skew_ns;
+    int jumped = -1;  ///< device whose reference clock was reported to have jumped; -1: none
+    std::int64_t jump_ns = 0;
+    std::int64_t jumped_at_ns = 0;  ///< when the first clock behind it left the window
     /// of the slave last reported as unknown, so that it is reported once
     std::uint32_t unknown_product = 0;
     bool unknown_reported = false;  ///< a slave that is not in the setup, until it is gone

@@ -61,6 +61,11 @@ enum class Event : std::uint8_t {
     dc_far,
     /// clock in the window again after dc_lost or dc_far [deviation ns, ms it was beyond it]
     dc_recovered,
+    /// the reference clock of `slave` has jumped, so that others are beyond the window [jump ns,
+    /// window ns]
+    dc_jumped,
+    /// the clocks are in the window again after dc_jumped [largest deviation ns, ms]
+    dc_jump_ended,
     dc_synchronised,  ///< all slaves [largest deviation ns, -]
     ring_broken,
     /// `slave` is the one before the break [position, responding to the primary port]

@@ -77,6 +77,8 @@ void Master::rescan() noexcept {
     Bus& bus = *bus_;
     bus.reference = -1;
     bus.skew_ns = 0;
+    bus.agreed_skew_ns.reset();
+    bus.jumped = -1;
     bus.status.dc_active = false;
     bus.image.set_reference(0, false);
     bus.bus_channel.set_now(bus.engine.now_ns());

@@ -2,6 +2,7 @@
 // The work for the whole bus: scan, start-up of all slaves at once, then the watch for slaves that
 // fail, go, or return.
 #include <algorithm>
+#include <cstdlib>
 
 #include "ethercat/master/bus.hpp"
 #include "ethercat/master/topology.hpp"
@@ -370,6 +371,54 @@ static Task<void> resynchronise(Channel& c, Bus& bus, Device& d) noexcept {
 /// 092Ch has 31 bits for it; a larger deviation is shown as this one.
 static constexpr std::int64_t largest_deviation_ns = 0x7fff'ffff;
 
+/// A smaller jump looks like the jitter of frames.
+static constexpr std::int64_t min_jump_ns = 100'000;
+
+/// Returns by how much the reference clock has jumped against the clock of the cycle, when that is
+/// why a slave deviates by `deviation_ns` from it; 0: it is not.
+static std::int64_t jump_of_reference(const Bus& bus, std::int64_t deviation_ns) noexcept {
+    if (!bus.agreed_skew_ns || bus.reference < 0) return 0;
+    if (bus.config(*bus.devices[static_cast<std::size_t>(bus.reference)]) == nullptr) return 0;
+    const std::int64_t jump = bus.skew_ns - *bus.agreed_skew_ns;
+    const std::int64_t size = std::abs(jump);
+    if (size < min_jump_ns) return 0;
+    if (deviation_ns >= largest_deviation_ns) return size >= largest_deviation_ns ? jump : 0;
+    return std::abs(size - deviation_ns) <= size / 4 ? jump : 0;
+}
+
+/// Notes that the clock of a slave has left the window, and whether the reference clock is why.
+static void note_deviation(Bus& bus, Device& d, std::int64_t now_ns) noexcept {
+    d.drifts_since_ns = now_ns;
+    const std::int64_t jump = jump_of_reference(bus, d.status.dc_deviation_ns);
+    d.follows_jump = jump != 0;
+    if (d.follows_jump) {
+        bus.jump_ns = jump;
+    }
+}
+
+/// Reports the clock that is out of step: that of the slave, or the reference clock, once for all
+/// slaves behind it.
+static void report_deviation(Bus& bus, const Device& d, std::int64_t window_ns) noexcept {
+    const std::int64_t deviation = d.status.dc_deviation_ns;
+    if (!d.follows_jump) {
+        const bool is_far = deviation >= largest_deviation_ns;
+        return bus.report(is_far ? Event::dc_far : Event::dc_lost, d, deviation, window_ns);
+    }
+    if (bus.jumped >= 0) return;
+    bus.jumped = bus.reference;
+    bus.jumped_at_ns = d.drifts_since_ns;
+    bus.report(Event::dc_jumped, *bus.devices[static_cast<std::size_t>(bus.jumped)], bus.jump_ns,
+               window_ns);
+}
+
+/// Reports that the clocks behind a reference clock that had jumped are within the window again.
+static void end_jump(Bus& bus, std::uint32_t max_deviation_ns, std::int64_t now_ns) noexcept {
+    if (bus.jumped < 0) return;
+    bus.report(Event::dc_jump_ended, *bus.devices[static_cast<std::size_t>(bus.jumped)],
+               max_deviation_ns, (now_ns - bus.jumped_at_ns) / millisecond);
+    bus.jumped = -1;
+}
+
 /// Reports a slave that is not in step for some time although it is in OP, and stops it where the
 /// setup requires it; reports it when it is again.
 static void check_clock(Bus& bus, Device& d, std::int64_t now_ns) noexcept {
@@ -383,21 +432,23 @@ static void check_clock(Bus& bus, Device& d, std::int64_t now_ns) noexcept {
         d.drifts_since_ns = 0;
     } else if (deviation > window) {
         if (d.drifts_since_ns == 0) {
-            d.drifts_since_ns = now_ns;
+            note_deviation(bus, d, now_ns);
         }
         if (d.drifted || now_ns - d.drifts_since_ns < bus.setup.dc_loss_ns || d.channel.busy()) {
             return;
         }
         d.drifted = true;
-        bus.report(deviation < largest_deviation_ns ? Event::dc_lost : Event::dc_far, d, deviation,
-                   window);
+        report_deviation(bus, d, window);
         if (bus.setup.dc_loss == DcLoss::safeop) {
             bus.run(d, [&] { return resynchronise(d.channel, bus, d); });
         }
     } else if (!d.drifted) {
         d.drifts_since_ns = 0;
     } else if (deviation <= bus.setup.sync_window_ns) {
-        bus.report(Event::dc_recovered, d, deviation, (now_ns - d.drifts_since_ns) / millisecond);
+        if (!d.follows_jump) {
+            const std::int64_t drifted_ns = now_ns - d.drifts_since_ns;
+            bus.report(Event::dc_recovered, d, deviation, drifted_ns / millisecond);
+        }
         d.drifted = false;
         d.drifts_since_ns = 0;
     }
@@ -429,6 +480,9 @@ static Task<void> look_at_clocks(Channel& c, Bus& bus) noexcept {
         bus.report(Event::dc_synchronised, max);
     }
     bus.status.dc_synchronised = synchronised;
+    if (synchronised) {
+        end_jump(bus, max, c.now_ns());
+    }
 }
 
 /// Returns whether a clock of the line may be far beyond the window: one datagram reads them all,
@@ -509,6 +563,8 @@ static Task<void> watch_clocks(Channel& c, Bus& bus, std::int64_t until_ns) noex
                                         [](const auto& d) { return d->drifts_since_ns != 0; });
         if (looks || drifts) {
             co_await look_at_clocks(c, bus);
+        } else {
+            bus.agreed_skew_ns = bus.skew_ns;
         }
     }
 }

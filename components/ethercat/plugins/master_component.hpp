@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdlib>
 #include <ctime>
 #include <deque>
 #include <memory>
@@ -476,13 +477,16 @@ private:
         if (event == Event::dc_lost || event == Event::dc_far) {
             begin(clock_faults_[slave], event, slave, first);
         }
+        if (event == Event::dc_jumped) {
+            begin(clock_faults_[slave], event, slave, std::abs(first));
+        }
         if (event == Event::data_stale) {
             begin(data_faults_[slave], event, slave);
         }
         if (event == Event::data_fresh) {
             end(data_faults_[slave]);
         }
-        if (event == Event::dc_recovered) {
+        if (event == Event::dc_recovered || event == Event::dc_jump_ended) {
             end(clock_faults_[slave]);
         }
         if (prevents_start(event) && failed_[slave] != event) {  // not at each try

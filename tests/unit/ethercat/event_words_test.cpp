@@ -75,6 +75,14 @@ TEST(EthercatEventWords, Objects_and_aborts_are_written_as_in_the_standard) {
     EXPECT_NE(words(Event::dc_far, 1, 0x7fff'ffff, 10'000)
                   .find("its clock deviates by more than 2.1 s from the reference clock"),
               std::string::npos);
+    EXPECT_EQ(words(Event::dc_jumped, 1, -9'876'600, 10'000),
+              "slave 4 (x-axis) has the reference clock, which jumped by 9877 us; the clocks "
+              "behind it deviate by more than 10 us: check its supply, and the manuals of the "
+              "slaves for what they do without synchronisation. To set the clocks again: stop, "
+              "then start");
+    EXPECT_EQ(words(Event::dc_jump_ended, 1, 900, 1200),
+              "the clocks behind slave 4 (x-axis) are within the window again, 1200 ms after its "
+              "clock jumped");
     EXPECT_EQ(words(Event::dc_tolerated, 1, 3'000, 1'000),
               "slave 4 (x-axis) deviates by 3 us from the reference clock, more than the window of "
               "1 us; it is started, because 10 us are tolerable: check the cycle of the thread, or "
@@ -220,7 +228,14 @@ TEST(EthercatEventWords, Faults_are_of_the_rows_of_the_sentences) {
     EXPECT_EQ(text(Event::slave_operational, 1), "");
     EXPECT_EQ(faults.of(Event::fell_back, 1)->detail(0x1b), 0x1b);
     EXPECT_DOUBLE_EQ(faults.of(Event::dc_lost, 1)->detail(348'974), 348.974);
+    EXPECT_EQ(text(Event::dc_jumped, 1),
+              "slave 1 (y) has the reference clock, which jumped by {} us; the clocks behind it "
+              "are out of step; to set them again: stop, then start");
+    EXPECT_DOUBLE_EQ(faults.of(Event::dc_jumped, 1)->detail(348'974), 348.974);
     setup.dc_loss = master::DcLoss::safeop;
+    EXPECT_EQ(config::fault_texts(setup, "eth:enp3s0").of(Event::dc_jumped, 1)->text,
+              "slave 1 (y) has the reference clock, which jumped by {} us; the clocks behind it "
+              "are out of step; their outputs are off until they are in step again");
     EXPECT_EQ(config::fault_texts(setup, "eth:enp3s0").of(Event::dc_lost, 1)->text,
               "slave 1 (y) is out of step, its clock deviates by {} us; its outputs are off until "
               "it is in step again");

@@ -183,6 +183,35 @@ TEST(EthercatClocks, A_clock_that_is_back_in_the_window_is_reported_and_a_short_
     EXPECT_EQ(w.log.count(Event::dc_lost), 1U);
 }
 
+TEST(EthercatClocks, A_reference_clock_that_jumps_is_named_and_not_the_slaves_behind_it) {
+    for (const std::int64_t jump_ns : {400'000LL, -400'000LL}) {
+        World w;
+        for (unsigned n = 0; n < 3; ++n) {
+            w.add(0x100 + n);
+        }
+        w.begin(with_clocks(3));
+        ASSERT_TRUE(w.operational(3000)) << w.log.text();
+        w.run(3000);
+        w.line.controller(0).jump_clock(jump_ns, w.now_ns);
+        w.run(1000);
+        ASSERT_EQ(w.log.count(Event::dc_jumped), 1U) << w.log.text();
+        EXPECT_EQ(w.log.last(Event::dc_jumped)->slave, 0U);
+        EXPECT_NEAR(static_cast<double>(w.log.last(Event::dc_jumped)->first),
+                    static_cast<double>(jump_ns), 10'000.0);
+        EXPECT_EQ(w.log.count(Event::dc_lost), 0U) << w.log.text();
+        EXPECT_EQ(w.log.count(Event::dc_jump_ended), 0U);
+        w.run(4000);
+        ASSERT_EQ(w.log.count(Event::dc_jump_ended), 1U) << w.log.text();
+        EXPECT_EQ(w.log.last(Event::dc_jump_ended)->slave, 0U);
+        EXPECT_EQ(w.log.count(Event::dc_recovered), 0U);
+        w.line.controller(2).jump_clock(jump_ns, w.now_ns);
+        w.run(1000);
+        ASSERT_EQ(w.log.count(Event::dc_lost), 1U) << w.log.text();
+        EXPECT_EQ(w.log.last(Event::dc_lost)->slave, 2U) << "its own clock";
+        EXPECT_EQ(w.log.count(Event::dc_jumped), 1U);
+    }
+}
+
 TEST(EthercatClocks, A_slave_out_of_step_waits_in_SAFE_OP_where_the_setup_says_so) {
     World w;
     for (unsigned n = 0; n < 3; ++n) {
