@@ -18,6 +18,7 @@
 #include "ethernet/journal/ordered_port.hpp"
 #include "link/call_journal.hpp"
 #include "link/call_order.hpp"
+#include "link/ordered_hold.hpp"
 #include "link/segment.hpp"
 
 namespace hal::test {
@@ -373,6 +374,37 @@ TEST(OrderedLink, Keeps_frames_while_another_thread_has_the_bus) {
     ASSERT_EQ(texts.size(), 2u);
     EXPECT_EQ(texts[0], "queued0active0queued2 257 258 2");
     EXPECT_EQ(texts[1], texts[0]);
+}
+
+TEST(OrderedHold, Gives_the_outcome_of_each_try_back_and_orders_the_calls_within) {
+    using link::OrderedHold;
+    std::vector<std::string> texts;
+    const std::vector<std::uint64_t> waited = twice([&texts](bool again) {
+        std::atomic_flag flag;
+        const auto order = link::CallOrder::of("can", "held-flag");
+        std::string text;
+        const auto attempt = [&] {
+            const OrderedHold hold(flag, OrderedHold::Wait::none);
+            if (!hold.is_held()) return text += "in use ";
+            const link::OrderedCall call(*order, link::OrderedCall::Wait::bounded);
+            return text += call.is_made() ? "called " : "not called ";
+        };
+        attempt();
+        if (!again) {
+            flag.test_and_set();  // by another thread
+        }
+        attempt();
+        flag.clear();
+        attempt();
+        const OrderedHold in_setup(flag, OrderedHold::Wait::made);
+        text += in_setup.is_held() ? "held" : "not held";
+        texts.push_back(text);
+    });
+    ASSERT_EQ(texts.size(), 2u);
+    EXPECT_EQ(texts[0], "called in use called held");
+    EXPECT_EQ(texts[1], texts[0]);
+    // the two that were held, each with a call, and the one in setup
+    EXPECT_EQ(waited, (std::vector<std::uint64_t>{0, 1, 2, 3, 4}));
 }
 
 }  // namespace

@@ -27,6 +27,33 @@ addf canopen-drive.0.update fast
 addf can-faults.0.update fast
 """
 
+# Masters in two threads share one link. With short periods they often want it at the same time.
+SHARED_LINK = """loadrt threads name1=fast period1=100000 name2=servo period2=200000
+loadrt canopen config=axis.canopen,io.canopen,more.canopen
+loadrt canopen_drive link=sim:axis id=2
+loadrt canopen_io link=sim:axis id=3,4
+addf canopen.0.receive servo
+addf canopen.0.transmit servo
+addf canopen.1.receive fast
+addf canopen.1.transmit fast
+addf canopen.2.receive servo
+addf canopen.2.transmit servo
+addf canopen-drive.0.update fast
+addf canopen-io.0.update servo
+addf canopen-io.1.update fast
+"""
+
+IO = """[bus]
+link = sim:axis
+bitrate = 1M
+sync = 1ms
+reset-at-start = no
+[node {id} io]
+device = cia401
+tpdo1 = read-inputs-1
+rpdo1 = write-outputs-1
+"""
+
 # Its thread is in a call on the bus most of the time.
 BUSY_BUS = """loadrt threads name1=servo period1=100000
 loadrt can_traffic names=a,b,c,d link=sim:busy one_node=1 id=0x200 messages=20
@@ -117,6 +144,27 @@ class ExactReplayOfBuses(Case):
         text = self.replay()
         self.assertRegex(text, r"\nno difference, \d{5,} values compared\n$")
         self.assertGreater(int(re.match(r"(\d+) cycles of 2 threads", text)[1]), 2000)
+
+    def test_two_threads_share_the_link_of_their_masters(self):
+        self.configure("sim:axis")
+        self.write("io.canopen", IO.format(id=3))
+        self.write("more.canopen", IO.format(id=4))
+        self.load_cpus()
+        machine = self.start(
+            "run",
+            self.write("a.hal", SHARED_LINK),
+            "--journal",
+            "run.mcap",
+            "--values",
+            "canopen.*",
+        )
+        for number in range(3):
+            self.wait_for(f"canopen.{number}.nodes-operational", "1")
+        self.wait_for_cycles("servo", 20_000)
+        self.finish(machine)
+        text = self.replay()
+        self.assertRegex(text, r"\nno difference, \d{5,} values compared\n$")
+        self.assertGreater(int(re.match(r"(\d+) cycles of 2 threads", text)[1]), 40_000)
 
     def test_a_bus_in_memory_is_opened_and_closed_while_a_thread_uses_it(self):
         self.load_cpus()

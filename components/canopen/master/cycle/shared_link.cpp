@@ -4,11 +4,14 @@
 #include <algorithm>
 #include <map>
 #include <mutex>
-#include <thread>
 
 #include "link/bus_key.hpp"
+#include "link/call_journal.hpp"
+#include "link/ordered_hold.hpp"
 
 namespace hal::canopen {
+
+using link::OrderedHold;
 
 class SharedBus {
 public:
@@ -16,34 +19,15 @@ public:
 
     explicit SharedBus(std::unique_ptr<can::Link> opened) : link(std::move(opened)) {}
 
-    /// [realtime] Only tries: who does not get it comes again in its next cycle.
-    class Try {
-    public:
-        explicit Try(SharedBus& bus) noexcept
-            : bus_(bus), got_(!bus.busy_.test_and_set(std::memory_order_acquire)) {}
-        ~Try() {
-            if (got_) {
-                bus_.busy_.clear(std::memory_order_release);
-            }
-        }
-        explicit operator bool() const noexcept { return got_; }
-
-    private:
-        SharedBus& bus_;
-        const bool got_;
-    };
     /// [setup]
     void change(SharedLink* from, SharedLink* to) {
-        while (busy_.test_and_set(std::memory_order_acquire)) {
-            std::this_thread::yield();
-        }
+        const OrderedHold hold(busy, OrderedHold::Wait::made);
         const auto place = std::find(users.begin(), users.end(), from);
         if (place != users.end()) {
             *place = to;
         }
         count = static_cast<std::size_t>(std::count_if(
             users.begin(), users.end(), [](const SharedLink* u) { return u != nullptr; }));
-        busy_.clear(std::memory_order_release);
     }
     /// To all but `from`. By who holds the bus. [realtime]
     void deliver(const can::Frame& frame, const SharedLink* from) noexcept {
@@ -62,9 +46,7 @@ public:
         std::atomic<std::int64_t> at{0};
     };
     std::array<Leader, 128> leaders{};  // by node-id
-
-private:
-    std::atomic_flag busy_;
+    std::atomic_flag busy;  // held while the link, the users and their queues are used
 };
 
 std::unique_ptr<SharedLink> SharedLink::open(const std::string& address,
@@ -104,6 +86,14 @@ SharedLink::~SharedLink() {
 }
 
 bool SharedLink::leads(std::uint8_t node_id, std::int64_t now_ns, std::int64_t period_ns) noexcept {
+    bool is_leader = claims_lead(node_id, now_ns, period_ns);
+    link::JournaledCall call;  // threads that run at the same time decide it between them
+    call.number(is_leader);
+    return is_leader;
+}
+
+bool SharedLink::claims_lead(std::uint8_t node_id, std::int64_t now_ns,
+                             std::int64_t period_ns) noexcept {
     auto& of_id = bus_->leaders[node_id & 0x7f];
     const SharedLink* leader = of_id.link.load(std::memory_order_relaxed);
     if (leader != this) {
@@ -116,8 +106,8 @@ bool SharedLink::leads(std::uint8_t node_id, std::int64_t now_ns, std::int64_t p
 }
 
 can::Sent SharedLink::send(const can::Frame& frame, std::int64_t now_ns) noexcept {
-    const SharedBus::Try held(*bus_);
-    if (!held) return can::Sent::full;
+    const OrderedHold hold(bus_->busy, OrderedHold::Wait::none);
+    if (!hold.is_held()) return can::Sent::full;
     const can::Sent sent = bus_->link->send(frame, now_ns);
     if (sent == can::Sent::queued && bus_->count > 1) {
         can::Frame copy = frame;
@@ -129,14 +119,14 @@ can::Sent SharedLink::send(const can::Frame& frame, std::int64_t now_ns) noexcep
 }
 
 void SharedLink::flush(std::int64_t now_ns) noexcept {
-    if (const SharedBus::Try held(*bus_); held) {
-        bus_->link->flush(now_ns);
-    }
+    const OrderedHold hold(bus_->busy, OrderedHold::Wait::none);
+    if (!hold.is_held()) return;
+    bus_->link->flush(now_ns);
 }
 
 std::size_t SharedLink::receive(std::span<can::Frame> buffer, std::int64_t now_ns) noexcept {
-    const SharedBus::Try held(*bus_);
-    if (!held) return 0;
+    const OrderedHold hold(bus_->busy, OrderedHold::Wait::none);
+    if (!hold.is_held()) return 0;
     if (bus_->count == 1 && incoming_.front() == nullptr)
         return bus_->link->receive(buffer, now_ns);
     for (can::Frame frame; bus_->link->receive(std::span(&frame, 1), now_ns) == 1;) {
@@ -160,8 +150,8 @@ std::vector<can::DeliveryTime> SharedLink::delivery_times() const {
     return bus_->link->delivery_times();
 }
 bool SharedLink::rejected(can::Rejected& what) noexcept {
-    const SharedBus::Try held(*bus_);
-    return held && bus_->link->rejected(what);
+    const OrderedHold hold(bus_->busy, OrderedHold::Wait::none);
+    return hold.is_held() && bus_->link->rejected(what);
 }
 std::int64_t SharedLink::closing_ns() const noexcept { return bus_->link->closing_ns(); }
 bool SharedLink::wait(std::int64_t at_most_ns) { return bus_->link->wait(at_most_ns); }

@@ -17,7 +17,8 @@ namespace hal::canopen {
 class SharedBus;
 
 /// A master's share of a link. What one sends the others hear, too. Those of one bus belong into
-/// one thread; in another one a master that finds the link in use waits for its next cycle.
+/// one thread; in another one a master that finds the link in use waits for its next cycle. Which
+/// one gets it, and which one leads, is in the journal of the program.
 class SharedLink final : public can::Link {
 public:
     /// Opens the address, or joins those that have it open. [setup]
@@ -45,6 +46,7 @@ public:
 private:
     friend class SharedBus;
     explicit SharedLink(std::shared_ptr<SharedBus>);
+    bool claims_lead(std::uint8_t node_id, std::int64_t now_ns, std::int64_t period_ns) noexcept;
 
     const std::shared_ptr<SharedBus> bus_;
     hal::Queue<can::Frame> incoming_{2048};  // pushed and popped by the holder of the bus
