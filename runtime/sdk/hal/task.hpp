@@ -109,12 +109,16 @@ struct TaskPromiseBase {
         *reinterpret_cast<TaskMemory**>(at) = &memory;
         return at + header;
     }
+    // Inline: GCC 12 would warn of every task that its delete is not that of its new
+    // (-Wmismatched-new-delete).
     template <class... Rest>
-    static void* operator new(std::size_t size, TaskChannel& channel, Rest&&...) {
+    [[gnu::always_inline]] static void* operator new(std::size_t size, TaskChannel& channel,
+                                                     Rest&&...) {
         return take(channel, size);
     }
     template <class Self, class... Rest>
-    static void* operator new(std::size_t size, Self&, TaskChannel& channel, Rest&&...) {
+    [[gnu::always_inline]] static void* operator new(std::size_t size, Self&, TaskChannel& channel,
+                                                     Rest&&...) {
         return take(channel, size);
     }
     static void operator delete(void* frame, std::size_t size) noexcept {

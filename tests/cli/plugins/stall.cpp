@@ -61,9 +61,9 @@ private:
         char line[64];
         const int n =
             std::snprintf(line, sizeof line, "%s %lld\n", what, static_cast<long long>(now()));
-        if (descriptor_ >= 0) [[maybe_unused]] {
-            const ssize_t written = ::write(descriptor_, line, static_cast<std::size_t>(n));
-        }
+        if (descriptor_ < 0) return;
+        [[maybe_unused]] const ssize_t written =
+            ::write(descriptor_, line, static_cast<std::size_t>(n));
     }
     int descriptor_ = -1;
     std::uint32_t done_ = 0;

@@ -39,9 +39,8 @@ struct Witness : hal::Component {
 
 private:
     void write(const char* text, std::size_t size) const noexcept {
-        if (descriptor_ >= 0) [[maybe_unused]] {
-            const ssize_t n = ::write(descriptor_, text, size);
-        }
+        if (descriptor_ < 0) return;
+        [[maybe_unused]] const ssize_t written = ::write(descriptor_, text, size);
     }
     int descriptor_ = -1;
 };

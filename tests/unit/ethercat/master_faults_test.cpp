@@ -98,7 +98,7 @@ TEST_F(EthercatFaults, Lost_and_doubled_frames_are_counted_and_stop_nothing) {
 TEST_F(EthercatFaults, A_slave_in_OP_that_takes_no_part_in_the_process_data_is_not_operational) {
     start(2);
     const auto set_fmmus = [&](std::uint8_t active) {
-        for (const std::uint16_t fmmu : {0x60c, 0x61c}) {
+        for (const std::uint16_t fmmu : {std::uint16_t{0x60c}, std::uint16_t{0x61c}}) {
             std::array<std::uint8_t, max_frame_bytes> bytes{};
             FrameWriter frame(bytes, {2, 0, 0, 0, 0, 9});
             put(frame.add(Command::fpwr, 0, at_station(0x1002, fmmu), 1), active);

@@ -9,12 +9,18 @@ namespace {
 
 using namespace hal::can;
 
+Description at_500_kbit() {
+    Description description;
+    description.bit_rate = 500'000;
+    return description;
+}
+
 TEST(Scocan_link, needs_a_node_of_this_process) {
     EXPECT_EQ(
         "scocan:nobody: no node 'nobody' in this process; load it before: loadrt scocan "
         "config=FILE.scocan node=nobody",
         open("scocan:nobody").problem);
-    const auto exchange = offer_slots("motor", {.bit_rate = 500'000});
+    const auto exchange = offer_slots("motor", at_500_kbit());
     EXPECT_EQ("scocan:moter: no node 'moter' in this process; nodes are motor",
               open("scocan:moter").problem);
     EXPECT_EQ(
@@ -27,7 +33,7 @@ TEST(Scocan_link, needs_a_node_of_this_process) {
 }
 
 TEST(Scocan_link, passes_frames_to_the_node_and_back) {
-    const auto exchange = offer_slots("motor", {.bit_rate = 500'000});
+    const auto exchange = offer_slots("motor", at_500_kbit());
     auto link = open("scocan:motor?slot=3").link;
     ASSERT_NE(nullptr, link);
     EXPECT_EQ(500'000U, link->description().bit_rate);
