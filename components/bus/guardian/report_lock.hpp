@@ -20,7 +20,7 @@ class ReportLock {
 public:
     /// Locks the report of a guardian of `link`, and waits for at most `limit_ns` for the guardian
     /// of a machine that has just ended. Returns the problem, or "". An empty name locks nothing,
-    /// and neither does a folder that is not writable: then there will be no report. [setup]
+    /// and neither does a folder that is not writable, to which no report is written. [setup]
     std::string acquire(const std::string& report, const std::string& link,
                         std::int64_t limit_ns = 2'000'000'000) {
         release();
