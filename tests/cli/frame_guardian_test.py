@@ -135,7 +135,8 @@ class FrameGuardian(GuardedMachine, Case):
         errors = self.end(machine)[1]
         self.stops(since)
         self.assertIn("guard: sends the stop frames: the component is unloaded\n", errors)
-        self.assertEqual(2, errors.count("guard: sends the stop frames: "), errors)
+        # the thread is stopped, the component is unloaded; a cycle may end between stop and end
+        self.assertIn(errors.count("guard: sends the stop frames: "), (2, 3), errors)
         self.assertRegex(errors, rf"guard: {SENT} after \d+\.\d ms\n")
         self.assertNotIn("previous run", self.next_start())
 
@@ -185,11 +186,6 @@ class FrameGuardian(GuardedMachine, Case):
         machine.send_signal(signal.SIGKILL)
         self.stops(since)
         errors = self.end(machine, signal.SIGKILL)[1]
-        for line in (
-            "the guardian has ended: nothing sends the stop frames until another one is started",
-            "another guardian has taken over; it sends what the first one has not sent",
-        ):
-            self.assertIn(f"guard: {line}\n", errors)
         self.assertIn(f"the process has ended; {SENT}", errors)
         self.assertIn(f"the process has ended; {SENT}", self.next_start())
 
@@ -204,7 +200,12 @@ class FrameGuardian(GuardedMachine, Case):
         self.stops(since)  # the reason lasts
         self.comes("guard.stopped", "TRUE")
         self.assertEqual("2", self.value("guard.stops"))
-        self.end(machine)
+        errors = self.end(machine)[1]
+        for line in (
+            "the guardian has ended: nothing sends the stop frames until another one is started",
+            "another guardian has taken over; it sends what the first one has not sent",
+        ):
+            self.assertIn(f"guard: {line}\n", errors)
 
     def test_a_guardian_that_is_killed_at_the_end_is_replaced(self):
         machine = self.run_guarded()
@@ -248,11 +249,10 @@ class FrameGuardian(GuardedMachine, Case):
         tracer.wait()
         tracer.stdout.close()
         since = time.monotonic()
-        machine.send_signal(signal.SIGKILL)
+        errors = self.end(machine)[1]
         self.stops(since)
         self.assertIn(
-            "guard: the guardian has stalled for 1.5 s and is killed; another one is started\n",
-            self.end(machine, signal.SIGKILL)[1],
+            "guard: the guardian has stalled for 1.5 s and is killed; another one is started\n", errors
         )
 
     def test_a_short_e_stop_is_counted(self):

@@ -2,7 +2,7 @@
 #include <atomic>
 #include <thread>
 
-#include "fieldbus/guardian/guardian_memory.hpp"
+#include "fieldbus/guardian/shared_record.hpp"
 
 namespace hal::guardian {
 namespace {
