@@ -581,5 +581,21 @@ TEST(EmulatedCard, Fault_input_switches_a_bridge_off_until_it_is_enabled_again) 
     EXPECT_EQ(bench.card->read(0x4600), three_phase_pwm::is_enabled);
 }
 
+TEST(CardConfig, Versions_of_encoders_are_those_of_the_card) {
+    const auto errors = [](const std::string& keys) {
+        const CardReadResult result = read_card("[card]\n" + keys, "test.mesa");
+        return text::errors_text(result.messages, "test.mesa");
+    };
+    EXPECT_EQ(errors("type = 7i76e\nencoder-version = 0x83\n"), "");
+    EXPECT_EQ(errors("type = 7i95\nencoder-version = 132\n"), "");
+    const std::string muxed = errors("type = 7i95\nencoder-version = 0x83\n");
+    EXPECT_NE(muxed.find("this card has no encoders of this version"), muxed.npos) << muxed;
+    EXPECT_NE(muxed.find("write encoder-version = 2, 3, 4 or 0x84"), muxed.npos) << muxed;
+    const std::string plain = errors("type = 7i92\nencoder-version = 4\n");
+    EXPECT_NE(plain.find("write encoder-version = 2, 3 or 0x83"), plain.npos) << plain;
+    const std::string unknown = errors("type = 7i92\nstepgen-version = 3\n");
+    EXPECT_NE(unknown.find("write 0, 1, 2, 0x42 or 0xC2"), unknown.npos) << unknown;
+}
+
 }  // namespace
 }  // namespace hal::mesa
