@@ -162,7 +162,12 @@ void ExecutionJournal::edited(std::uint64_t epoch, std::vector<std::vector<std::
     add(std::move(entry));
 }
 
-void ExecutionJournal::withdrawn() { add({.kind = ExecutionEntry::Kind::withdrawn}); }
+void ExecutionJournal::withdrawn(std::uint64_t epoch,
+                                 std::vector<std::vector<std::string>> commands) {
+    ExecutionEntry entry{.kind = ExecutionEntry::Kind::withdrawn, .epoch = epoch};
+    entry.commands = std::move(commands);
+    add(std::move(entry));
+}
 
 void ExecutionJournal::written(std::vector<std::pair<std::string, std::uint64_t>> values) {
     ExecutionEntry entry{.kind = ExecutionEntry::Kind::written};

@@ -46,7 +46,7 @@ public:
                              std::uint32_t id) override;
     void edited(std::uint64_t epoch, std::vector<std::vector<std::string>> commands,
                 const Model& model) override;
-    void withdrawn() override;
+    void withdrawn(std::uint64_t epoch, std::vector<std::vector<std::string>> commands) override;
     void written(std::vector<std::pair<std::string, std::uint64_t>> values) override;
     void switched(bool running) override;
     void halted() noexcept override { is_halt_unnoted_ = true; }

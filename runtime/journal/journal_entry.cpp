@@ -58,6 +58,9 @@ std::string to_json(const ExecutionEntry& entry) {
         break;
     case Kind::sampled: json["names"] = entry.names; break;
     case Kind::withdrawn:
+        json["epoch"] = entry.epoch;
+        json["commands"] = entry.commands;
+        break;
     case Kind::start:
     case Kind::stop:
     case Kind::end: break;
@@ -92,7 +95,10 @@ std::optional<ExecutionEntry> execution_entry(std::string_view text) {
             json.at("streams").get_to(entry.streams);
             break;
         case Kind::sampled: json.at("names").get_to(entry.names); break;
-        case Kind::withdrawn:
+        case Kind::withdrawn:  // without members in earlier versions
+            entry.epoch = json.value("epoch", entry.epoch);
+            entry.commands = json.value("commands", entry.commands);
+            break;
         case Kind::start:
         case Kind::stop:
         case Kind::end: break;

@@ -294,6 +294,10 @@ std::vector<Core*> ReExecution::cores() const {
 }
 
 std::string ReExecution::state(std::string& problem) {
+    if (has_withdrawn_) {  // its memory was allocated, too
+        problem = "an edit before it was rolled back after threads had taken it";
+        return "";
+    }
     MachineState machine(*session_, cores());
     const std::string memory = machine.capture();
     if (memory.empty()) {
@@ -510,10 +514,7 @@ bool ReExecution::make(const ExecutionEntry& entry) {
     switch (entry.kind) {
     case ExecutionEntry::Kind::edit: return make_edit(entry);
     case ExecutionEntry::Kind::written: return write(entry);
-    case ExecutionEntry::Kind::withdrawn:
-        return fail(State::ends,
-                    "an edit was rolled back after threads had taken it: its cycles "
-                    "cannot be executed again");
+    case ExecutionEntry::Kind::withdrawn: return make_withdrawn(entry);
     case ExecutionEntry::Kind::sampled:
         if (!entry.names.empty()) {
             sampled_(entry.names);
@@ -529,21 +530,39 @@ bool ReExecution::make(const ExecutionEntry& entry) {
     return true;
 }
 
+/// Returns whether the transaction took effect; nothing when the entry is invalid, which is a
+/// failure.
+std::optional<bool> ReExecution::commit(const ExecutionEntry& entry, Diagnostics& diagnostics) {
+    session_->threads().continue_after(entry.epoch);
+    Transaction transaction = session_->begin();
+    for (const auto& words : entry.commands) {
+        if (words.empty() || !make_command(transaction, words, diagnostics)) {
+            fail(State::fails, "invalid entry of the journal: " + text_of(entry.commands));
+            return std::nullopt;
+        }
+    }
+    return transaction.commit(diagnostics);
+}
+
+/// A thread that did not take the plan live has no cycle with it, so that the edit is rolled back
+/// again, and the threads that took it take the plan before it again in the same cycles.
+bool ReExecution::make_withdrawn(const ExecutionEntry& entry) {
+    has_withdrawn_ = true;
+    constexpr const char* reason =
+        "an edit was rolled back after threads had taken it: its cycles cannot be executed again";
+    if (entry.commands.empty() || catches_up_) return fail(State::ends, reason);
+    Diagnostics diagnostics;
+    const std::optional<bool> done = commit(entry, diagnostics);
+    if (!done || state_ != State::goes_on) return false;
+    return !*done || fail(State::ends, reason);
+}
+
 bool ReExecution::make_edit(const ExecutionEntry& entry) {
     ++edits_;
-    session_->threads().continue_after(entry.epoch);
     Diagnostics diagnostics;
-    bool done = false;
-    {
-        Transaction transaction = session_->begin();
-        for (const auto& words : entry.commands) {
-            if (words.empty() || !make_command(transaction, words, diagnostics)) {
-                return fail(State::fails,
-                            "invalid entry of the journal: " + text_of(entry.commands));
-            }
-        }
-        done = transaction.commit(diagnostics);
-    }
+    const std::optional<bool> committed = commit(entry, diagnostics);
+    if (!committed) return false;
+    const bool done = *committed;
     if (done || state_ != State::goes_on) return done;
     if (breaks_off()) {
         return fail(State::ends,

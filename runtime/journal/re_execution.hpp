@@ -146,6 +146,8 @@ private:
     bool make_next_edit();
     bool make(const ExecutionEntry& entry);
     bool make_edit(const ExecutionEntry& entry);
+    bool make_withdrawn(const ExecutionEntry& entry);
+    std::optional<bool> commit(const ExecutionEntry& entry, Diagnostics& diagnostics);
     bool make_command(Transaction& transaction, const std::vector<std::string>& words,
                       Diagnostics& diagnostics);
     bool make_of_program(Transaction& transaction, const std::vector<std::string>& words);
@@ -169,6 +171,7 @@ private:
     bool catches_up_ = false;  // executes the edits before the state, without cycles
     std::uint64_t epoch_at_rest_ = std::uint64_t{1} << 62;  // of the plans of the next edit at rest
     bool outside_ = false;
+    bool has_withdrawn_ = false;  // an edit of the journal was rolled back
     bool accepts_differences_ = false;
     std::optional<JournaledCycle> diverged_;
     std::string reason_;

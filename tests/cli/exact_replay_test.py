@@ -84,6 +84,20 @@ net total sum.out
 """
 
 
+# The threads may be blocked.
+TIMED = """loadrt threads name1=servo period1=1000000 supervise1=off name2=slow period2=5000000 supervise2=off
+loadrt siggen names=wave
+loadrt sum2 names=sum
+loadrt timed names=first file=x
+addf wave.update servo
+addf sum servo
+addf first slow
+net sine wave.sine => sum.in0
+net total sum.out
+start
+"""
+
+
 def edits(count, values):
     """Lines that change the machine while it runs, and as many values."""
     dice = random.Random(34)
@@ -314,6 +328,43 @@ start
             text,
         )
         self.assertIsNotNone(found, text)
+
+    def test_an_edit_that_a_thread_does_not_take_is_rolled_back_again(self):
+        mark = lambda name: self.folder / name
+        machine = self.run_journaled(TIMED, "--values", "*")
+        edit = subprocess.Popen(
+            [str(HAL), "shell"],
+            cwd=self.folder,
+            env=self.environment,
+            stdin=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        self.addCleanup(self.end, edit, signal.SIGKILL)
+        edit.stdin.write(
+            "begin\nloadrt timed names=second file=y waits=1\naddf second servo\n"
+            "net count second.out => sum.in1\ncommit\n"
+        )
+        edit.stdin.close()
+        edit.stdin = None
+        wait_until(lambda: mark("y.started").exists(), "the instance is started")
+        mark("x.hold").touch()
+        wait_until(lambda: mark("x.holding").exists(), "the slow thread is in a cycle")
+        mark("y.go").touch()
+        error = edit.communicate(timeout=TIMEOUT)[1]
+        self.assertIn("slow", error)
+        mark("x.hold").unlink()
+        self.wait_for_cycles(100)
+        self.give(["loadrt sum2 names=extra", "addf extra slow", "net sine => extra.in0"])
+        self.wait_for_cycles(100)
+        self.finish(machine)
+        text = self.replay()
+        self.assertRegex(text, r"\nno difference, \d{4,} values compared\n$")
+        # its state has the memory of the edit that was rolled back
+        self.assertIn(
+            "--cut: the state of the machine cannot be written: an edit before it was rolled back",
+            self.replay("--break", "extra.out > -5", "--cut", "cut.mcap", status=1),
+        )
 
     def test_a_journal_without_cycles_gives_no_recording(self):
         netlist = self.write("a.hal", "loadrt integ names=sum\n")

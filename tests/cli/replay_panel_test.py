@@ -162,9 +162,9 @@ class ReplayPanel(Case):
         # the first execution of the journal has begun, or --until waits
         client.run("where")
         client.run("break", "sine", ">", "5")
-        while (moment := client.ask(moment=True)["moment"]).get("fastest_cycle") != 400:
-            client.run("where")
-        self.assertTrue(moment["frontier"] > moment["cycles"])
+        moment = lambda: client.ask(moment=True)["moment"]
+        wait_until(lambda: moment().get("fastest_cycle") == 400, "--until is reached")
+        self.assertGreater(moment()["frontier"], moment()["cycles"])
 
     def test_of_very_many_marks_no_fault_is_left_out(self):
         journal_incident(self, edits=10_100)

@@ -27,7 +27,7 @@ struct Results final : ExecutionSink, CycleSchedule {
         return nullptr;
     }
     void edited(std::uint64_t, std::vector<std::vector<std::string>>, const Model&) override {}
-    void withdrawn() override {}
+    void withdrawn(std::uint64_t, std::vector<std::vector<std::string>>) override {}
     void written(std::vector<std::pair<std::string, std::uint64_t>>) override {}
     void switched(bool) override {}
     void halted() noexcept override {}

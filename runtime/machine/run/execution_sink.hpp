@@ -50,8 +50,10 @@ public:
     /// of each command, substituted.
     virtual void edited(std::uint64_t epoch, std::vector<std::vector<std::string>> commands,
                         const Model& model) = 0;
-    /// A transaction was rolled back after threads had taken it.
-    virtual void withdrawn() = 0;
+    /// A transaction was rolled back after threads had taken it, and they have the plans of the
+    /// model before it again. `epoch` and `commands`: as of edited(); none when a thread may still
+    /// use what the transaction has made.
+    virtual void withdrawn(std::uint64_t epoch, std::vector<std::vector<std::string>> commands) = 0;
     /// Programs have written these pins: names and values.
     virtual void written(std::vector<std::pair<std::string, std::uint64_t>> values) = 0;
     /// The functions were started or stopped.

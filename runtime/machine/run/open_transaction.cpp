@@ -80,7 +80,7 @@ void OpenTransaction::abandon() {
     actions_.clear();
     needs_threads_ = false;
     if (edit_) {
-        withdraw();
+        withdraw(nullptr, state_.threads.epoch());
     }
 }
 
@@ -111,7 +111,7 @@ bool OpenTransaction::commit(Diagnostics& diagnostics) {
     if (!good && edit_ && state_.options.check_only) {
         close_edit();
     } else if (!good && edit_) {
-        withdraw(&diagnostics);
+        withdraw(&diagnostics, epoch);
     }
     open_ = false;
     if (good && edits) {
@@ -195,21 +195,35 @@ bool OpenTransaction::start_added(Diagnostics& diagnostics) {
     return !diagnostics.failed();
 }
 
-/// Undoes the transaction, in the model and in threads that have taken it.
-void OpenTransaction::withdraw(Diagnostics* diagnostics) {
-    if (state_.setup) {
-        state_.setup->forget();
-    }
-    if (touched_ && state_.options.sink) {
-        state_.options.sink->withdrawn();
-    }
+/// Undoes the transaction, in the model and in threads that have taken it. `epoch`: of the last plan
+/// before it.
+void OpenTransaction::withdraw(Diagnostics* diagnostics, std::uint64_t epoch) {
+    const bool is_taken = touched_;
     edit_->undo();
     Diagnostics ignored;
-    if (!touched_ || restore_threads(diagnostics ? *diagnostics : ignored)) {
+    const bool is_undone = !touched_ || restore_threads(diagnostics ? *diagnostics : ignored);
+    if (is_undone) {
         close_edit();
     } else {
         keep_for_good(std::move(edit_));  // a thread may still use what the edit made
         forget_edit();
+    }
+    if (is_taken) {
+        journal_withdrawal(epoch, is_undone);
+    } else if (state_.setup) {
+        state_.setup->forget();
+    }
+}
+
+/// The cycles of threads that have taken it, and again the plans before it, need the same edit.
+void OpenTransaction::journal_withdrawal(std::uint64_t epoch, bool is_undone) noexcept {
+    if (!state_.options.sink) return;
+    try {
+        state_.setup->flush(*state_.options.sink);
+        state_.options.sink->withdrawn(
+            epoch, is_undone ? std::exchange(words_, {}) : std::vector<std::vector<std::string>>());
+    } catch (const std::bad_alloc&) {
+        // The re-execution ends where the first cycle needs it.
     }
 }
 

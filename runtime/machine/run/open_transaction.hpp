@@ -57,7 +57,8 @@ private:
     bool carry_out(Diagnostics& diagnostics);
     bool carry_out_checked(Diagnostics& diagnostics);
     bool start_added(Diagnostics& diagnostics);
-    void withdraw(Diagnostics* diagnostics = nullptr);
+    void withdraw(Diagnostics* diagnostics, std::uint64_t epoch);
+    void journal_withdrawal(std::uint64_t epoch, bool is_undone) noexcept;
     bool restore_threads(Diagnostics& diagnostics);
     void close_edit();
     void forget_edit();
