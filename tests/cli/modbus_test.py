@@ -160,8 +160,8 @@ class Modbus(Case):
         self.write("away.modbus", TCP.format(line="tcp:192.0.2.1:502"))
         self.assertEqual(
             "hal node modbus: listen:192.0.2.1:502: cannot listen: Cannot assign requested address; "
-            "the slaves listen where link = tcp:192.0.2.1:502 of the file connects to; for another "
-            "port of this computer write --link listen:5020, and load the machine with "
+            "link = tcp:192.0.2.1:502 of the file must be an address of this computer and a free "
+            "port; for another one write --link listen:5020, and load the machine with "
             "link=tcp:127.0.0.1:5020\n",
             self.bad("node", "modbus", "away.modbus"),
         )

@@ -58,9 +58,9 @@ line::Opened open_line(const ModbusNodeOptions& options, const Bus& bus, std::st
     auto opened = line::open(link, bus.line);
     if (!opened && options.link.empty() && !listening.empty()) {
         opened.problem +=
-            "; the slaves listen where link = " + bus.link +
-            " of the file connects to; for another port of this computer write --link "
-            "listen:5020, and load the machine with link=tcp:127.0.0.1:5020";
+            "; link = " + bus.link +
+            " of the file must be an address of this computer and a free port; for another one "
+            "write --link listen:5020, and load the machine with link=tcp:127.0.0.1:5020";
     }
     return opened;
 }
