@@ -263,12 +263,12 @@ TEST_F(Programs, each_end_of_a_stream_is_one_process) {
     ask({{"stream", "stream.7"}, {"create", {{"types", "u"}, {"depth", 9}}}, {"owner", "p"}});
     constexpr pid_t init = 1;  // a process that lives
     auto first = std::make_unique<Connection>(machine.shell, init);
-    Connection sibling(machine.shell, init);
+    auto sibling = std::make_unique<Connection>(machine.shell, init);
     Connection second(machine.shell, ::getpid());
     const Json feed{{"stream", "stream.7"}, {"records", {{1}}}};
     const Json take{{"stream", "stream.7"}, {"take", 1}};
     EXPECT_EQ(ask(*first, feed)["taken"], 1);
-    EXPECT_EQ(ask(sibling, feed)["taken"], 1) << "the same process";
+    EXPECT_EQ(ask(*sibling, feed)["taken"], 1) << "the same process";
     EXPECT_EQ(ask(second, feed)["error"],
               "stream 'stream.7' is fed by process 1 already; records of two would be mixed; end "
               "that process first");
@@ -279,6 +279,12 @@ TEST_F(Programs, each_end_of_a_stream_is_one_process) {
                                               " already; two readers would take each other's "
                                               "records; end that process first");
     first.reset();
+    EXPECT_EQ(ask(second, feed)["error"],
+              "stream 'stream.7' is fed by process 1 already; records of two would be mixed; end "
+              "that process first")
+        << "its other connection still feeds it";
+    EXPECT_EQ(ask(*sibling, feed)["taken"], 1);
+    sibling.reset();
     EXPECT_EQ(ask(second, feed)["taken"], 1);
 
     // a process that has ended, and the end of its connection is still unknown

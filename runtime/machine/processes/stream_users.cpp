@@ -29,14 +29,25 @@ std::string StreamUsers::claim(std::string_view stream, End end, std::uint64_t o
     const auto user = std::ranges::find_if(
         users_, [&](const User& u) { return u.stream == stream && u.end == end; });
     if (user == users_.end()) {
-        users_.push_back({std::string(stream), end, owner, process});
+        users_.push_back({std::string(stream), end, {owner}, process});
         return "";
     }
-    if (user->owner == owner || (process > 0 && user->process == process)) return "";
+    if (std::ranges::find(user->owners, owner) != user->owners.end()) return "";
+    if (process > 0 && user->process == process) {
+        user->owners.push_back(owner);
+        return "";
+    }
     if (!has_ended(user->process)) return rejection(stream, end, user->process);
-    user->owner = owner;
+    user->owners = {owner};
     user->process = process;
     return "";
+}
+
+void StreamUsers::release(std::uint64_t owner) {
+    for (User& user : users_) {
+        std::erase(user.owners, owner);
+    }
+    std::erase_if(users_, [](const User& user) { return user.owners.empty(); });
 }
 
 }  // namespace hal

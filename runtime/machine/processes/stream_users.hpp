@@ -21,16 +21,14 @@ public:
     /// string; or why it cannot be: another living process is. Connections of one process share an
     /// end.
     std::string claim(std::string_view stream, End end, std::uint64_t owner, pid_t process);
-    /// A connection has ended.
-    void release(std::uint64_t owner) {
-        std::erase_if(users_, [&](const User& user) { return user.owner == owner; });
-    }
+    /// A connection has ended. Its process keeps an end that another connection of it uses.
+    void release(std::uint64_t owner);
 
 private:
     struct User {
         std::string stream;
         End end = End::reads;
-        std::uint64_t owner = 0;
+        std::vector<std::uint64_t> owners;  ///< connections of `process`
         pid_t process = 0;  ///< 0 or less: unknown
     };
 
