@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include <gtest/gtest.h>
 
+#include <string>
+
 #include "tools/comp/comp.hpp"
 #include "tools/comp/syntax.hpp"
+#include "tools/comp/toolchain.hpp"
 
 namespace {
 
@@ -189,6 +192,12 @@ TEST_F(Comp, turns_manual_page_macros_into_Markdown) {
               "**loadrt**\nloads\n\n```\na  b\n```");
     EXPECT_EQ(markdown_of(".BR pid (9)\n.5 is a half"), "**pid**(9)\n.5 is a half");
     EXPECT_EQ(line_of("two\nlines  here"), "two lines here");
+}
+
+TEST(RunProgram, gives_the_program_nothing_to_read) {
+    std::string printed;
+    EXPECT_EQ(hal::tools::run_program({"readlink", "/proc/self/fd/0"}, printed), 0);
+    EXPECT_EQ(printed, "/dev/null\n");
 }
 
 }  // namespace

@@ -69,6 +69,9 @@ int run_program(const std::vector<std::string>& words, std::string& output) {
     argv.push_back(nullptr);
     const pid_t child = ::fork();
     if (child == 0) {
+        // a program that reads what it does not get as arguments, as addr2line does, must not wait
+        const int nothing = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
+        ::dup2(nothing, STDIN_FILENO);
         ::dup2(ends[1], STDOUT_FILENO);
         ::dup2(ends[1], STDERR_FILENO);
         std::signal(SIGPIPE, SIG_DFL);
