@@ -99,9 +99,19 @@ std::string status_json(const Context& context) {
 }
 
 /// Three figures of a distribution in one column each.
-std::string figures(double p50, double p99, double max) {
-    return fmt::format("{:>9} {:>9} {:>9}", format_duration(p50), format_duration(p99),
-                       format_duration(max));
+std::string figures(const ThreadReport& thread, double p50, double p99, double max) {
+    return fmt::format("{:>9} {:>9} {:>9}", thread.figure(p50), thread.figure(p99),
+                       thread.figure(max));
+}
+
+/// The mean and the maximum of the sampled calls of a function; a maximum of 0 was reset.
+std::string call_figures(const plan::FunctionTimes& times, std::int32_t max_ns) {
+    const auto samples = times.samples.load(std::memory_order_relaxed);
+    const auto total = times.total_ns.load(std::memory_order_relaxed);
+    const double mean =
+        samples == 0 ? 0 : static_cast<double>(total) / static_cast<double>(samples);
+    return fmt::format("{:>9} {:>9} {:>9}", samples == 0 ? "-" : format_duration(mean),
+                       max_ns == 0 ? "-" : format_duration(max_ns), samples);
 }
 
 /// What is not ordinary about a thread.
@@ -190,8 +200,8 @@ void show_timing(Context& context) {
         const ThreadReport r = context.session.reports().thread(*thread);
         text += fmt::format("{:<20} {:>10} {:>10} {:>8} {} {}  {}{}{}\n", r.name,
                             format_duration(static_cast<double>(r.period_ns)), r.cycles, r.missed,
-                            figures(r.wakeup_p50_ns, r.wakeup_p99_ns, r.wakeup_max_ns),
-                            figures(r.busy_p50_ns, r.busy_p99_ns, r.busy_max_ns), r.policy,
+                            figures(r, r.wakeup_p50_ns, r.wakeup_p99_ns, r.wakeup_max_ns),
+                            figures(r, r.busy_p50_ns, r.busy_p99_ns, r.busy_max_ns), r.policy,
                             r.cpu >= 0 ? fmt::format(", CPU {}", r.cpu) : "", state_of(r));
     }
     text += clock_text(context.session);
@@ -209,12 +219,8 @@ void show_timing(Context& context) {
     const auto values = context.session.values().read_pins(maxima);
     for (std::size_t i = 0; i < functions.size(); ++i) {
         const LoadedFunction& function = *functions[i];
-        const auto samples = function.times->samples.load(std::memory_order_relaxed);
-        const auto total = function.times->total_ns.load(std::memory_order_relaxed);
-        const double mean =
-            samples == 0 ? 0 : static_cast<double>(total) / static_cast<double>(samples);
-        text += fmt::format("{:<40} {:>9} {:>9} {:>9}  {}\n", function.name, format_duration(mean),
-                            format_duration(values[i].s32), samples, function.thread->name);
+        text += fmt::format("{:<40} {}  {}\n", function.name,
+                            call_figures(*function.times, values[i].s32), function.thread->name);
     }
     context.output.out(text + "\n");
 }

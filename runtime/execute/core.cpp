@@ -167,7 +167,7 @@ void Core::cycle(std::int64_t grid_ns, std::int64_t due_ns, std::int64_t woke_ns
             run();
         }
         if (measure_) {
-            store(*pins_.wakeup, static_cast<std::int32_t>(woke_ns - due_ns));
+            store(*pins_.wakeup, pin_ns(woke_ns - due_ns));
         }
         end_ns = account(woke_ns, ran);
         limiter_.flush(measure_ ? woke_ns : due_ns,
@@ -784,7 +784,7 @@ void Core::run_timed(const plan::Function& function, const plan::Step* steps) no
     if (tracing_) {
         tracing_->put(TraceEvent::function, begin, end, info_.number, function.id);
     }
-    const auto took = static_cast<std::int32_t>(std::min<std::int64_t>(end - begin, INT32_MAX));
+    const std::int32_t took = pin_ns(end - begin);
     plan::FunctionTimes& times = *function.times;
     store(times.time, took);
     const bool more = took > times.tmax.slot->s32;
@@ -807,7 +807,7 @@ std::int64_t Core::account(std::int64_t woke_ns, bool ran) noexcept {
     const std::int64_t busy_ns = now_ns - woke_ns;
     busy.add(busy_ns);
     if (ran) {  // as in LinuxCNC, cycles without functions have no times
-        const auto took = static_cast<std::int32_t>(busy_ns < INT32_MAX ? busy_ns : INT32_MAX);
+        const std::int32_t took = pin_ns(busy_ns);
         store(*pins_.time, took);
         const bool more = took > pins_.tmax->slot->s32;
         if (more) {
@@ -821,8 +821,12 @@ std::int64_t Core::account(std::int64_t woke_ns, bool ran) noexcept {
     const auto count = [](std::atomic<std::uint64_t>& counter) {
         counter.store(counter.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
     };
-    if (now_ns - info_.start_ns > period_ns_) count(overruns);
-    if (!in_budget) count(over_budget);
+    if (now_ns - info_.start_ns > period_ns_) {
+        count(overruns);
+    }
+    if (!in_budget) {
+        count(over_budget);
+    }
     const auto event = [&](hal_fault_code code) -> FaultEvent {
         return {code,           slow_function(woke_ns),       info_.number,
                 info_.start_ns, static_cast<double>(busy_ns), nullptr,

@@ -4,6 +4,7 @@
 // define a cycle.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <csetjmp>
 #include <cstdint>
@@ -224,6 +225,10 @@ public:
     /// Cycles that ended after the next deadline; cycles over the budget or of `max_overrun` periods.
     /// Written by the thread.
     std::atomic<std::uint64_t> overruns{0}, over_budget{0};
+    /// Returns a duration as the pins of a thread show it: 2.1 s also for longer ones.
+    static std::int32_t pin_ns(std::int64_t ns) noexcept {
+        return static_cast<std::int32_t>(std::min<std::int64_t>(ns, INT32_MAX));
+    }
     bool stopped_by_fault() const { return stopped_.load(std::memory_order_acquire); }
 
     /// Returns the core whose functions run on the calling thread, or nullptr; for crash and

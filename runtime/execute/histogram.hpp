@@ -21,6 +21,13 @@ public:
             max_.store(value, std::memory_order_relaxed);
         }
     }
+    std::uint64_t samples() const noexcept {
+        std::uint64_t total = 0;
+        for (const auto& c : counts_) {
+            total += c.load(std::memory_order_relaxed);
+        }
+        return total;
+    }
     std::uint64_t max_ns() const noexcept { return max_.load(std::memory_order_relaxed); }
     std::uint64_t count(std::size_t bucket) const noexcept {
         return counts_[bucket].load(std::memory_order_relaxed);
@@ -33,10 +40,7 @@ public:
     }
     /// Returns the quantile `share` (0 to 1) of all samples, interpolated within its bucket.
     double quantile(double share) const noexcept {
-        std::uint64_t total = 0;
-        for (const auto& c : counts_) {
-            total += c.load(std::memory_order_relaxed);
-        }
+        const std::uint64_t total = samples();
         if (total == 0) return 0.0;
         const double wanted = share * static_cast<double>(total);
         double seen = 0.0;

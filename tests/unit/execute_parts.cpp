@@ -33,6 +33,12 @@ TEST(Core, is_not_late_before_its_first_cycle_is_due) {
     EXPECT_EQ(core.monitor.overdue_since_ns(), now + 700'000) << "it has begun";
 }
 
+TEST(Core, shows_a_long_latency_as_the_longest_that_its_pin_holds) {
+    EXPECT_EQ(Core::pin_ns(740'000), 740'000);
+    EXPECT_EQ(Core::pin_ns(-12), -12);
+    EXPECT_EQ(Core::pin_ns(3'600'000'000), INT32_MAX);
+}
+
 TEST(Core, has_the_missed_periods_before_a_turn_that_is_executed_again) {
     constexpr std::int64_t period = 1'000'000;
     FaultBoard board;

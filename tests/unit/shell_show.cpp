@@ -215,6 +215,8 @@ TEST_F(Show, timing_and_latency_are_readable) {
     const std::string timing = machine.says("show timing");
     EXPECT_NE(timing.find("\nslow "), std::string::npos) << timing;
     EXPECT_NE(timing.find("virtual clock"), std::string::npos) << timing;
+    EXPECT_EQ(timing.find(" 0 ns"), std::string::npos) << "nothing was measured:\n" << timing;
+    EXPECT_NE(timing.find("         -         -         -  virtual"), std::string::npos) << timing;
     EXPECT_EQ(machine.says("show fault"), "no faults\n");
     EXPECT_NE(machine.says("show latency s").find("a.out => b.in0"), std::string::npos)
         << machine.out;

@@ -164,11 +164,11 @@ std::string timing_report(Session& session) {
     text += fmt::format(columns, "thread", width, "period", "cycles", "missed", "wake-up p50",
                         "p99", "max", "busy p50", "p99", "max");
     for (const ThreadReport& r : reports) {
-        text += fmt::format(columns, r.name, width,
-                            format_duration(static_cast<double>(r.period_ns)), r.cycles, r.missed,
-                            format_duration(r.wakeup_p50_ns), format_duration(r.wakeup_p99_ns),
-                            format_duration(r.wakeup_max_ns), format_duration(r.busy_p50_ns),
-                            format_duration(r.busy_p99_ns), format_duration(r.busy_max_ns));
+        text +=
+            fmt::format(columns, r.name, width, format_duration(static_cast<double>(r.period_ns)),
+                        r.cycles, r.missed, r.figure(r.wakeup_p50_ns), r.figure(r.wakeup_p99_ns),
+                        r.figure(r.wakeup_max_ns), r.figure(r.busy_p50_ns), r.figure(r.busy_p99_ns),
+                        r.figure(r.busy_max_ns));
     }
     std::string policies;
     for (const ThreadReport& r : reports) {

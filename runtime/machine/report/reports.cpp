@@ -68,6 +68,10 @@ std::vector<FaultRecord> Reports::lasting_faults() const {
     return faults_.lasting(machine_.executor.now_ns());
 }
 
+std::string ThreadReport::figure(double ns) const {
+    return measured == 0 ? "-" : format_duration(ns);
+}
+
 ThreadReport Reports::thread(const Thread& thread) const {
     ThreadReport report;
     report.name = thread.name;
@@ -78,6 +82,7 @@ ThreadReport Reports::thread(const Thread& thread) const {
     report.missed = core->monitor.missed_by(machine_.executor.now_ns());
     report.overruns = core->overruns.load();
     report.over_budget = core->over_budget.load();
+    report.measured = core->busy.samples();
     report.wakeup_p50_ns = core->wakeup.quantile(0.5);
     report.wakeup_p99_ns = core->wakeup.quantile(0.99);
     report.wakeup_max_ns = static_cast<double>(core->wakeup.max_ns());

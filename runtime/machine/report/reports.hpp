@@ -23,6 +23,8 @@ struct ThreadReport {
     std::uint64_t missed = 0;
     std::uint64_t overruns = 0;  ///< cycles that ended after the next deadline
     std::uint64_t over_budget = 0;  ///< cycles over the budget, or of 10 periods and more
+    /// cycles that the following figures are of; 0: none was measured, as on the virtual clock
+    std::uint64_t measured = 0;
     double wakeup_p50_ns = 0;
     double wakeup_p99_ns = 0;
     double wakeup_max_ns = 0;  ///< wake-up latency
@@ -44,6 +46,9 @@ struct ThreadReport {
     std::int64_t silent_ns = 0;  ///< hung: time since its last finished cycle
     std::string function;  ///< hung: the function that does not return; empty: none
     bool supervised = true;  ///< false with supervise=off
+
+    /// Returns one of the durations above as text; "-": no cycle was measured.
+    std::string figure(double ns) const;
 };
 
 /// The distribution of a thread's durations since its start: lower edge (ns) and count of each
