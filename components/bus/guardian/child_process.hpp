@@ -91,7 +91,7 @@ public:
             syscall(SYS_pidfd_send_signal, process_.get(), SIGCONT, nullptr, 0);
         }
     }
-    /// Kills it, and waits for its end for at most a second: a debugger may hold the dead process.
+    /// Kills it, and waits for its end for at most a second: a debugger may hold its remains.
     /// [setup]
     void kill() noexcept {
         if (pid_ < 0) return;

@@ -19,8 +19,8 @@ namespace hal::bus {
 class ReportLock {
 public:
     /// Locks the report of a guardian of `link`, and waits for at most `limit_ns` for the guardian
-    /// of a machine that has just ended. Returns the problem, or "". An empty name locks nothing,
-    /// and neither does a folder that is not writable, to which no report is written. [setup]
+    /// of a machine that has just ended. Returns the problem, or "". Locks nothing when the name is
+    /// empty or the folder is not writable, because the guardian cannot write a report then. [setup]
     std::string acquire(const std::string& report, const std::string& link,
                         std::int64_t limit_ns = 2'000'000'000) {
         release();

@@ -32,7 +32,7 @@ public:
           memory_(memory),
           transmitter_(transmitter),
           parent_(std::move(parent)),
-          previous_(memory.record.read()),
+          previous_(memory.record.last()),
           reason_(previous_.reason),
           stop_count_(memory.followed.load(std::memory_order_acquire)),
           stops_(previous_.status.stops) {

@@ -23,10 +23,10 @@ public:
         status_.store(record.status.word(), std::memory_order_release);
         sequence_.store(odd + 1, std::memory_order_release);
     }
-    /// Returns parts of the same moment, unless the guardian was killed while it wrote them.
-    StopRecord read() const noexcept {
-        StopRecord record;
-        for (int attempt = 0; attempt < 10'000; ++attempt) {
+    /// Reads the record. Returns false when its parts may be of different moments: the guardian is
+    /// writing it for longer than this waits, or was killed meanwhile.
+    bool read(StopRecord& record) const noexcept {
+        for (int attempt = 0; attempt < 1000; ++attempt) {
             const std::uint32_t before = sequence_.load(std::memory_order_acquire);
             record = {.status = status(),
                       .reason = static_cast<StopReason>(reason_.load(std::memory_order_relaxed)),
@@ -35,8 +35,14 @@ public:
                       .unsent = unsent_.load(std::memory_order_relaxed)};
             std::atomic_thread_fence(std::memory_order_acquire);
             const std::uint32_t behind = sequence_.load(std::memory_order_relaxed);
-            if (before == behind && (before & 1) == 0) break;
+            if (before == behind && (before & 1) == 0) return true;
         }
+        return false;
+    }
+    /// Returns the record of a guardian that has ended, as far as it has written it.
+    StopRecord last() const noexcept {
+        StopRecord record;
+        read(record);
         return record;
     }
     /// Returns the newest status alone. [realtime]

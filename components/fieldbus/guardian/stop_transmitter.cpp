@@ -158,7 +158,6 @@ void StopTransmitter::begin(std::int64_t now_ns) noexcept {
 
 std::int64_t StopTransmitter::work(std::int64_t now_ns) noexcept {
     receive(now_ns);
-    follow_attempt(now_ns);
     if (is_over()) return now_ns + attempt_limit_ns;
     std::int64_t pause_ns = schedule_.every_ns;
     if (outcome_ == Outcome::delayed) {
@@ -167,7 +166,6 @@ std::int64_t StopTransmitter::work(std::int64_t now_ns) noexcept {
     if (!in_attempt_ && now_ns >= attempt_ns_ + pause_ns) {
         begin_attempt(now_ns);
         receive(now_ns);
-        follow_attempt(now_ns);
     }
     return now_ns + poll_ns;
 }
@@ -318,6 +316,8 @@ void StopTransmitter::receive(std::int64_t now_ns) noexcept {
             accept(buffer_[n]);
         }
     }
+    follow_attempt(
+        now_ns);  // a round that is complete counts before its confirmation ends the stop
     if (!is_over() && rounds_sent_ != 0 && is_confirmed() && !frames_.confirmations.empty()) {
         in_attempt_ = false;
         outcome_ = Outcome::confirmed;

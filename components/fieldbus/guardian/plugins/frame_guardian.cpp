@@ -270,7 +270,7 @@ private:
 
     /// The guardian has ended by request, and nothing sends what it has not sent.
     void report_unsent(bool has_ended) noexcept {
-        const StopRecord stop = memory().record.read();
+        const StopRecord stop = memory().record.last();
         const Outcome outcome = stop.status.outcome;
         if (has_ended && outcome != Outcome::sending && outcome != Outcome::delayed) return;
         reporter_.tell({.event = Event::not_sent, .stop = stop});
@@ -349,9 +349,10 @@ private:
         nanosleep(&pause, nullptr);
     }
 
-    /// Reports what has changed since the last call.
+    /// Reports what has changed since the last call; later, when it is being written now.
     void report_outcome() noexcept {
-        const StopRecord stop = memory().record.read();
+        StopRecord stop;
+        if (!memory().record.read(stop)) return;
         const Status& now = stop.status;
         const auto tell = [&](Event event) { reporter_.tell({.event = event, .stop = stop}); };
         const bool is_new = now.stops != shown_.stops;
