@@ -93,7 +93,7 @@ EXPECTED = [
     "error: .*the interface is not set up for CAN FD; .*",
 ]
 IN_A_GUEST = [
-    SENT + r" 3 times; [3-7]\d{3}\.\d ms",
+    SENT + r" 3 times; \d+\.\d ms",
     # ahead of the commands that wait, and behind them
     r"frames: 201#1027 (201#0000 000#0200 )+201#1027 .*201#0000 000#0200 201#0000 000#0200 201#0000 000#0200 ",
 ]
