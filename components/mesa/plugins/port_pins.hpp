@@ -2,7 +2,10 @@
 // I/O pins: the free ones as gpio.NNN, and the levels of those that modules use.
 #pragma once
 
-#include <memory>
+#include <bit>
+#include <deque>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "mesa/hostmot2/pin.hpp"
@@ -20,29 +23,28 @@ public:
           in_(o.component, o.read, named(number, "in"), "level of the pin"),
           in_not_(o.component, o.read, named(number, "in_not"), "level of the pin, inverted") {
         if (pin.is_gpio) {
-            out_ = std::make_unique<hal::In<bool>>(o.component, o.write, named(number, "out"),
-                                                   "level of the output");
-            is_output_ = parameter(o, named(number, "is_output"), "TRUE: the pin is an output");
+            out_.emplace(o.component, o.write, named(number, "out"), "level of the output");
+            is_output_.emplace(o.component, named(number, "is_output"),
+                               "TRUE: the pin is an output");
         }
         if (pin.is_gpio || is_module_output_) {
-            open_drain_ = parameter(o, named(number, "is_opendrain"),
-                                    "TRUE: an output of TRUE leaves the pin floating");
-            invert_ = parameter(o, named(number, "invert_output"), "TRUE: the output is inverted");
+            open_drain_.emplace(o.component, named(number, "is_opendrain"), open_drain_doc);
+            invert_.emplace(o.component, named(number, "invert_output"), invert_doc);
         }
         if (is_module_output_) {
             const std::string function = function_of(pin.descriptor);
             if (function.empty()) return;
-            open_drain_alias_ = parameter(o, (function + ".is_opendrain").c_str(),
-                                          "TRUE: an output of TRUE leaves the pin floating");
-            invert_alias_ =
-                parameter(o, (function + ".invert_output").c_str(), "TRUE: the output is inverted");
+            open_drain_alias_.emplace(o.component, (function + ".is_opendrain").c_str(),
+                                      open_drain_doc);
+            invert_alias_.emplace(o.component, (function + ".invert_output").c_str(), invert_doc);
         }
     }
 
     bool is_output() const noexcept { return is_module_output_ || is_true(is_output_); }
     bool is_module_output() const noexcept { return is_module_output_; }
+    /// The rest is that of an output.
     bool is_open_drain() const noexcept {
-        return is_output() && (is_true(open_drain_) || is_true(open_drain_alias_));
+        return is_true(open_drain_) || is_true(open_drain_alias_);
     }
     bool is_inverted() const noexcept { return is_true(invert_) || is_true(invert_alias_); }
     bool level() const noexcept { return out_ && *out_; }
@@ -52,19 +54,20 @@ public:
     }
 
 private:
-    using Parameter = std::unique_ptr<hal::Param<bool>>;
+    // all of a pin is in one place: a cycle that comes once in a millisecond finds nothing of it in
+    // the caches
+    using Parameter = std::optional<hal::Param<bool>>;
+    static constexpr const char* open_drain_doc = "TRUE: an output of TRUE leaves the pin floating";
+    static constexpr const char* invert_doc = "TRUE: the output is inverted";
 
     static const char* named(unsigned number, const char* name) {
         return brief_name("gpio.%03u.%s", number, name);
-    }
-    static Parameter parameter(const PinOwner& o, const char* name, const char* doc) {
-        return std::make_unique<hal::Param<bool>>(o.component, name, doc);
     }
     static bool is_true(const Parameter& parameter) noexcept { return parameter && *parameter; }
 
     const bool is_module_output_;
     hal::Out<bool> in_, in_not_;
-    std::unique_ptr<hal::In<bool>> out_;
+    std::optional<hal::In<bool>> out_;
     Parameter is_output_, open_drain_, invert_, open_drain_alias_, invert_alias_;
 };
 
@@ -73,7 +76,7 @@ public:
     PortPins(const PinOwner& o, const CardImage& image, const CardModule& module)
         : addresses_(module.addresses), ports_(image.idrom.ports), width_(image.idrom.port_width) {
         for (unsigned n = 0; n < image.pins.size(); ++n) {
-            pins_.push_back(std::make_unique<PortPin>(o, n, image.pins[n]));
+            pins_.emplace_back(o, n, image.pins[n]);
         }
         for (unsigned port = 0; port < ports_; ++port) {
             registers_.emplace_back(addresses_, port);
@@ -89,8 +92,8 @@ public:
             r.open_drain.receive(reading.writes_arrived);
             r.direction.receive(reading.writes_arrived);
         }
-        for (std::size_t n = 0; n < pins_.size(); ++n) {
-            pins_[n]->show((reply.word(levels_, n / width_) >> n % width_ & 1U) != 0);
+        for (unsigned port = 0; port < ports_; ++port) {
+            show(port, reply.word(levels_, port), reading.is_after_gap);
         }
     }
     void miss(double) noexcept override {
@@ -103,7 +106,8 @@ public:
     /// [realtime]
     bool modules_are_released() const noexcept {
         for (unsigned port = 0; port < ports_; ++port) {
-            if ((registers_[port].module_outputs & ~registers_[port].direction.confirmed()) != 0) return false;
+            if ((registers_[port].module_outputs & ~registers_[port].direction.confirmed()) != 0)
+                return false;
         }
         return true;
     }
@@ -150,15 +154,30 @@ private:
         Setting data, source, invert;
         PinSwitch direction, open_drain;
         std::uint32_t module_outputs = 0;  ///< bit per pin
+        std::uint32_t shown = 0;  ///< levels
+        bool is_shown = false;
     };
 
+    /// Shows the levels of a port: of the pins that have changed, or of all.
+    void show(unsigned port, std::uint32_t levels, bool all) noexcept {
+        Registers& r = registers_[port];
+        std::uint32_t changed = all || !r.is_shown ? ~0U : levels ^ r.shown;
+        r.shown = levels;
+        r.is_shown = true;
+        changed &= ~0U >> (32 - width_);
+        for (; changed != 0; changed &= changed - 1) {
+            const auto n = static_cast<unsigned>(std::countr_zero(changed));
+            pins_[port * width_ + n].show((levels >> n & 1U) != 0);
+        }
+    }
     Bits bits_of(unsigned port) const noexcept {
         Bits bits;
         for (unsigned n = 0; n < width_ && port * width_ + n < pins_.size(); ++n) {
-            const PortPin& pin = *pins_[port * width_ + n];
+            const PortPin& pin = pins_[port * width_ + n];
+            if (!pin.is_output()) continue;  // level and inversion are those of outputs
             const std::uint32_t bit = 1U << n;
+            bits.direction |= bit;
             bits.data |= pin.level() ? bit : 0;
-            bits.direction |= pin.is_output() ? bit : 0;
             bits.source |= pin.is_module_output() ? bit : 0;
             bits.open_drain |= pin.is_open_drain() ? bit : 0;
             bits.invert |= pin.is_inverted() ? bit : 0;
@@ -168,7 +187,7 @@ private:
 
     const ModuleAddresses addresses_;
     const unsigned ports_, width_;
-    std::vector<std::unique_ptr<PortPin>> pins_;
+    std::deque<PortPin> pins_;
     std::vector<Registers> registers_;
     std::size_t levels_ = 0;
 };
