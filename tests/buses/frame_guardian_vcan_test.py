@@ -36,6 +36,8 @@ rejected() { # NETLIST
 candump -L vcan0 >heard & candump=$!
 begin plain
 kill_it plain
+n=0
+until [ $(wc -l <heard) -ge 6 ] || [ $n -eq 50 ]; do n=$((n + 1)); sleep 0.1; done
 echo "frames: $(sed 's/.* //' heard | tr '\\n' ' ')"
 begin confirmed
 (while sleep 0.2; do cansend vcan0 701#7F; cansend vcan0 701#04; done) & device=$!
@@ -76,6 +78,8 @@ candump -L vcan0 >slow & candump=$!
 begin queued
 cangen vcan0 -g 0 -I 201 -L 2 -D 1027 -n 100  # they wait for 3 s
 kill_it queued
+n=0
+until tail -n 1 slow | grep -q ' 000#0200$' || [ $n -eq 50 ]; do n=$((n + 1)); sleep 0.1; done
 kill $candump
 echo "frames: $(sed 's/.* //' slow | uniq | tr '\\n' ' ')"
 """
