@@ -169,6 +169,12 @@ void ExecutionJournal::withdrawn(std::uint64_t epoch,
     add(std::move(entry));
 }
 
+void ExecutionJournal::skipped(std::vector<std::uint64_t> calls) {
+    ExecutionEntry entry{.kind = ExecutionEntry::Kind::skipped};
+    entry.calls = std::move(calls);
+    add(std::move(entry));
+}
+
 void ExecutionJournal::written(std::vector<std::pair<std::string, std::uint64_t>> values) {
     ExecutionEntry entry{.kind = ExecutionEntry::Kind::written};
     entry.values = std::move(values);

@@ -47,6 +47,7 @@ public:
     void edited(std::uint64_t epoch, std::vector<std::vector<std::string>> commands,
                 const Model& model) override;
     void withdrawn(std::uint64_t epoch, std::vector<std::vector<std::string>> commands) override;
+    void skipped(std::vector<std::uint64_t> calls) override;
     void written(std::vector<std::pair<std::string, std::uint64_t>> values) override;
     void switched(bool running) override;
     void halted() noexcept override { is_halt_unnoted_ = true; }

@@ -14,6 +14,7 @@ constexpr std::pair<Kind, const char*> kinds[] = {
     {Kind::written, "written"}, {Kind::start, "start"},
     {Kind::stop, "stop"},       {Kind::opened, "opened"},
     {Kind::sampled, "sampled"}, {Kind::end, "end"},
+    {Kind::skipped, "skipped"},
 };
 
 const char* name_of(Kind kind) {
@@ -57,6 +58,7 @@ std::string to_json(const ExecutionEntry& entry) {
         json["streams"] = entry.streams;
         break;
     case Kind::sampled: json["names"] = entry.names; break;
+    case Kind::skipped: json["calls"] = entry.calls; break;
     case Kind::withdrawn:
         json["epoch"] = entry.epoch;
         json["commands"] = entry.commands;
@@ -95,6 +97,7 @@ std::optional<ExecutionEntry> execution_entry(std::string_view text) {
             json.at("streams").get_to(entry.streams);
             break;
         case Kind::sampled: json.at("names").get_to(entry.names); break;
+        case Kind::skipped: json.at("calls").get_to(entry.calls); break;
         case Kind::withdrawn:  // without members in earlier versions
             entry.epoch = json.value("epoch", entry.epoch);
             entry.commands = json.value("commands", entry.commands);

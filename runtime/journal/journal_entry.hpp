@@ -22,14 +22,15 @@ struct JournaledFile {
 struct ExecutionEntry {
     enum class Kind {
         edit,       ///< a transaction took effect: epoch, commands, files
-        withdrawn,  ///< a transaction was rolled back after threads had taken it
-        written,    ///< programs wrote pins: values
-        start,      ///< functions were started
+        withdrawn,  ///< a transaction was rolled back after threads had taken it: epoch, commands
+        skipped,  ///< a transaction was rejected that had used buses in memory: calls
+        written,  ///< programs wrote pins: values
+        start,  ///< functions were started
         stop,
         opened,  ///< an instance depends on the outside: instance, component,
-                 ///< resources, threads, helpers, links, streams
+        ///< resources, threads, helpers, links, streams
         sampled,  ///< the values of these names are recorded from here on: names
-        end,      ///< the machine ended in order
+        end,  ///< the machine ended in order
     };
     Kind kind = Kind::end;
     std::uint64_t epoch = 0;
@@ -44,6 +45,7 @@ struct ExecutionEntry {
     std::uint64_t links = 0;
     std::uint64_t streams = 0;
     std::vector<std::string> names = {};
+    std::vector<std::uint64_t> calls = {};
 };
 
 /// Returns an entry as a line of JSON. [setup]

@@ -63,6 +63,10 @@ ReExecution::ReExecution(JournalFile& file) : file_(file) {
         }
     }
     now_ns_ = begin_ns_.value_or(0);
+    for (const ExecutionEntry& entry : file.entries()) {
+        skipped_calls_.insert(entry.calls.begin(), entry.calls.end());
+    }
+    pass_skipped_calls();
     if (!file.begin()) return;
     if (const std::string problem = component_heap::track(); !problem.empty()) {
         fail(State::fails, "the state that the journal begins with cannot be restored: " + problem);
@@ -252,14 +256,25 @@ void ReExecution::wait_for_call(std::uint64_t ticket) {
         cursor.stack->leave();
     }
     cursor.in_call = false;
+    pass_call(ticket);
+}
+
+void ReExecution::pass_call(std::uint64_t ticket) {
     next_call_ = std::max(next_call_, ticket + 1);
+    pass_skipped_calls();
+}
+
+void ReExecution::pass_skipped_calls() {
+    while (skipped_calls_.contains(next_call_)) {
+        ++next_call_;
+    }
 }
 
 /// Called by a setup call, on the session's stack.
 void ReExecution::wait_for_setup_call(std::uint64_t ticket) {
     while (ticket > next_call_ && step()) {
     }
-    next_call_ = std::max(next_call_, ticket + 1);
+    pass_call(ticket);
 }
 
 void ReExecution::note_overlap(Cursor& cursor, std::uint64_t ticket, bool covered) {
@@ -400,6 +415,7 @@ bool ReExecution::begin_at_state() {
     mcap::Fields fields(begin.state);
     next_ticket_ = fields.get<std::uint64_t>();
     next_call_ = fields.get<std::uint64_t>();
+    pass_skipped_calls();
     MachineState machine(*session_, cores());
     if (!machine.restore(fields.rest())) {
         return fail(State::fails, "the state that the journal begins with cannot be restored: " +
@@ -523,6 +539,7 @@ bool ReExecution::make(const ExecutionEntry& entry) {
     case ExecutionEntry::Kind::opened:
         outside_ = outside_ || !entry.resources.empty() || entry.threads > 0;
         return true;
+    case ExecutionEntry::Kind::skipped:
     case ExecutionEntry::Kind::start:
     case ExecutionEntry::Kind::stop:
     case ExecutionEntry::Kind::end: return true;  // the cycles have it

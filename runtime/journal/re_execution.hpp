@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -137,6 +138,8 @@ private:
     void wait_for(std::uint64_t ticket, bool covered) override;
     void note_overlap(Cursor& cursor, std::uint64_t ticket, bool covered);
     void wait_for_call(std::uint64_t ticket) override;
+    void pass_call(std::uint64_t ticket);
+    void pass_skipped_calls();
     JournaledCycle cycle_of(const Cursor& cursor) const;
     void load(Cursor& cursor);
     State end_of_journal();
@@ -162,6 +165,7 @@ private:
     Cursor* running_ = nullptr;
     std::uint64_t next_ticket_ = 0;
     std::uint64_t next_call_ = 0;  // ticket
+    std::set<std::uint64_t> skipped_calls_;  // tickets that no call of the re-execution has
     std::uint64_t overlaps_ = 0;
     JournaledCycle first_overlap_;
     std::size_t entry_ = 0;  // the next one

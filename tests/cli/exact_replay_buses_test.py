@@ -184,6 +184,20 @@ unloadrt can_faults
         self.assertRegex(text, r"\nno difference, \d{4,} values compared\n$")
         self.assertRegex(text, r"^\d+ cycles of 1 thread, \d{3} edits")
 
+    def test_an_edit_that_uses_a_bus_in_memory_and_is_rejected(self):
+        # two nodes acknowledge each other's frames, so that a third one changes nothing
+        netlist = self.write("a.hal", BUSY_BUS.replace(" one_node=1", ""))
+        machine = self.start("run", netlist, "--journal", "run.mcap", "--values", "*")
+        self.wait_for_cycles("servo", 100)
+        # the second instance does not start, so the first one is removed from the bus again
+        edit = "loadrt can_faults link=sim:busy victim=0\nloadrt can_send link=can:none-such id=5\n"
+        for _ in range(5):
+            done = self.run_program("shell", given=f"begin\n{edit}commit\n")
+            self.assertIn("none-such", done.stderr)
+        self.wait_for_cycles("servo", 100)
+        self.finish(machine)
+        self.assertRegex(self.replay(), r"\nno difference, \d{4,} values compared\n$")
+
     @unittest.skipIf(SANITIZED, "a sanitizer has the functions of the clock and of files")
     def test_a_master_whose_node_is_killed(self):
         self.configure(self.bus)

@@ -54,6 +54,8 @@ public:
     /// model before it again. `epoch` and `commands`: as of edited(); none when a thread may still
     /// use what the transaction has made.
     virtual void withdrawn(std::uint64_t epoch, std::vector<std::vector<std::string>> commands) = 0;
+    /// These ordered calls on buses in memory were made by a transaction that was rejected: tickets.
+    virtual void skipped(std::vector<std::uint64_t> calls) = 0;
     /// Programs have written these pins: names and values.
     virtual void written(std::vector<std::pair<std::string, std::uint64_t>> values) = 0;
     /// The functions were started or stopped.

@@ -211,7 +211,7 @@ void OpenTransaction::withdraw(Diagnostics* diagnostics, std::uint64_t epoch) {
     if (is_taken) {
         journal_withdrawal(epoch, is_undone);
     } else if (state_.setup) {
-        state_.setup->forget();
+        state_.setup->reject(state_.options.sink);
     }
 }
 

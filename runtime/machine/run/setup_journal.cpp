@@ -80,7 +80,10 @@ bool SetupJournal::get(void* bytes, std::size_t size) {
 }
 
 void SetupJournal::order_call(std::uint64_t ticket) {
-    if (!schedule_) return put(&ticket, sizeof ticket);
+    if (!schedule_) {
+        ordered_.push_back(ticket);
+        return put(&ticket, sizeof ticket);
+    }
     if (get(&ticket, sizeof ticket)) {
         schedule_->wait_for_setup_call(ticket);
     }
@@ -109,7 +112,15 @@ void SetupJournal::flush(ExecutionSink& sink) {
     forget();
 }
 
+void SetupJournal::reject(ExecutionSink* sink) {
+    if (sink && !ordered_.empty()) {
+        sink->skipped(std::exchange(ordered_, {}));
+    }
+    forget();
+}
+
 void SetupJournal::forget() {
+    ordered_.clear();
     calls_.clear();
     files_.clear();
     call_since_ns_ = 0;

@@ -47,25 +47,27 @@ public:
 
     /// The transaction has taken effect: what its calls got goes to the sink.
     void flush(ExecutionSink& sink);
-    /// The transaction was rejected.
-    void forget();
+    /// The transaction was rejected: nothing of it is written but which ordered calls it has made.
+    void reject(ExecutionSink* sink);
 
     // SetupReader
     std::int64_t reading(std::int64_t value) override;
     int opened(const char* path, int (*open_now)(const char*, int), int flags) override;
 
 private:
+    void forget();
     int record_file(const char* path, int descriptor);
     static int descriptor_of(const SetupFile& file);
 
     CycleSchedule* const schedule_;
     std::int64_t call_since_ns_ = 0;  // identifies the call
-    SetupResults results_;            // of the call that is executed again
+    SetupResults results_;  // of the call that is executed again
     std::size_t links_at_ = 0;
     std::size_t readings_at_ = 0;
     bool has_results_ = false;
     bool hidden_ = false;
     std::vector<SetupResults> calls_;
+    std::vector<std::uint64_t> ordered_;  // tickets of the transaction
     std::vector<SetupFile> files_;
     std::optional<Acquisition> before_link_;
     OutsideWorld acquired_;
