@@ -152,7 +152,8 @@ class NewMachine(Case):
                     self.assertEqual(0, checked.returncode, checked.stderr)
                 alone = self.run_in(folder, "check", f"{name}.hal").stderr
                 self.assertTrue(
-                    f"; type: hal check {name}.ini\n" in alone or "--ini FILE.ini" in alone, alone
+                    f"; type: hal check {name}.ini\n" in alone or f"--ini {name}.ini" in alone,
+                    alone,
                 )
                 self.assertIn(test.split(" 2>")[0], (folder / "README.md").read_text())
                 done = subprocess.run(
