@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """frame_guardian_vcan_test.py BUS_TESTS: the guardian of stop frames on a real SocketCAN interface, in user-mode-linux where the machine has no vcan0: a machine
-that is killed, one whose device confirms, and interfaces that are down, full, listen-only, or have old frames in their queue."""
+that is killed, one whose device confirms, and interfaces that are down, full, listen-only, or have old frames in their queue.
+"""
 
 import re
 import shutil
@@ -135,7 +136,11 @@ def main(hal):
         done = subprocess.run(command, cwd=folder, stdout=subprocess.PIPE, text=True, check=False)
         print(done.stdout)
         expected = EXPECTED + (IN_A_GUEST if is_guest else [])
-        lines = [line for line in done.stdout.splitlines() if line.startswith(("the ", "frames", "error"))]
+        lines = [
+            line
+            for line in done.stdout.splitlines()
+            if line.startswith(("the ", "frames", "error"))
+        ]
         matches = [re.fullmatch(*pair) is not None for pair in zip(expected, lines)]
         if len(lines) == len(expected) and all(matches):
             return done.returncode

@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """includes.py ROOT: fails when a source includes what its folder may not reach (file:line and the rule), when a folder has no row, and when
-folders include each other in a circle, and when code outside drivers/ tests the prefix of an address."""
+folders include each other in a circle, and when code outside drivers/ tests the prefix of an address.
+"""
+
 import re
 import sys
 from pathlib import Path

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """package.py ROOT BUILD: installs the build into a folder of its own, and builds a component against it from three lines of CMake."""
+
 import os
 import re
 import subprocess

@@ -303,9 +303,7 @@ class ExactReplay(Case):
         self.assertEqual(1, done.returncode)
 
     def test_a_difference_that_no_recorded_value_has_is_named_by_a_later_one(self):
-        netlist = (
-            SERVO
-            + """loadrt gauge file=number.txt
+        netlist = SERVO + """loadrt gauge file=number.txt
 loadrt integ names=late
 newthread slow 50000000
 addf gauge.0 servo
@@ -313,7 +311,6 @@ addf late slow
 net number gauge.0.out => late.in
 start
 """
-        )
         self.write("number.txt", "5\n")
         machine = self.run_journaled(netlist, "--values", "late.out")
         self.wait_for_cycles(300)

@@ -110,5 +110,3 @@ class GuardedMachine:
         self.guarded()
         self.end(machine)
         self.assertNotIn("another program", self.next_start())
-
-

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: MIT
 # packages: linuxcnc
 """hal linuxcnc: the order in which everything starts and ends, its environment, and what goes wrong."""
+
 import os
 import signal
 import time

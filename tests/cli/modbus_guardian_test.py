@@ -56,9 +56,7 @@ class Guardian(GuardedMachine, Case):
 
     def test_a_killed_process(self):
         self.killed(signal.SIGKILL)
-        self.assertIn(
-            "slave 1 (spindle) acknowledged its stop telegrams", self.next_start()
-        )
+        self.assertIn("slave 1 (spindle) acknowledged its stop telegrams", self.next_start())
         self.assertNotIn("previous run", self.next_start())
 
     def test_sigterm(self):

@@ -3,6 +3,7 @@
 # packages: linuxcnc ethercat
 """linuxcnc_machine_test.py HAL: `hal linuxcnc` with LinuxCNC's own programs, as the Debian package linuxcnc-uspace installs them, unmodified.
 77: the package is not installed."""
+
 import csv
 import importlib.util
 import os

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """An emulated Mesa card in a network namespace of its own, and a driver under `hal run` that reaches it over a veth pair: what the tests of Mesa's peers share."""
+
 import os
 import subprocess
 import sys

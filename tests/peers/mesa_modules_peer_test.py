@@ -238,7 +238,9 @@ def muxed(machine):
         at["zero"] = raw - machine.get_number(f"{counter}.count")
         return at
 
-    seen = with_both(machine, MUXED_CARD, card, "num_encoders=4 num_stepgens=1 sserial_port_0=xxxxxxxx", use)
+    seen = with_both(
+        machine, MUXED_CARD, card, "num_encoders=4 num_stepgens=1 sserial_port_0=xxxxxxxx", use
+    )
     for driver, at in seen.items():
         check(f"{driver}: the index is at 5000 counts", at["zero"] == 5000, at)
     if len(seen) == 2:
