@@ -28,7 +28,7 @@ addf can-faults.0.update fast
 """
 
 # Masters in two threads share one link. With short periods they often want it at the same time.
-SHARED_LINK = """loadrt threads name1=fast period1=100000 name2=servo period2=200000
+SHARED_LINK = """loadrt threads name1=fast period1=100000 supervise1=60s name2=servo period2=200000 supervise2=60s
 loadrt canopen config=axis.canopen,io.canopen,more.canopen
 loadrt canopen_drive link=sim:axis id=2
 loadrt canopen_io link=sim:axis id=3,4
@@ -54,8 +54,8 @@ tpdo1 = read-inputs-1
 rpdo1 = write-outputs-1
 """
 
-# Its thread is in a call on the bus most of the time.
-BUSY_BUS = """loadrt threads name1=servo period1=100000
+# Its thread is in a call on the bus most of the time. With a sanitizer it takes ten times as long, and so does writing the journal.
+BUSY_BUS = f"""loadrt threads name1=servo period1={1000000 if SANITIZED else 100000}
 loadrt can_traffic names=a,b,c,d link=sim:busy one_node=1 id=0x200 messages=20
 addf a.update servo
 addf b.update servo
