@@ -129,5 +129,27 @@ TEST_F(Reload, that_a_hung_thread_may_still_use_leaves_nothing_to_the_next_edit)
     EXPECT_EQ(machine.get("c.step"), "4");
 }
 
+TEST_F(Reload, and_new_threads_that_are_rejected_keep_the_plan_of_a_thread_that_does_not_end) {
+    Watch hung;
+    static Watch starting;  // the process keeps what a thread may still use
+    machine.must("loadrt test-life names=y " + hung.argument() + "\naddf y slow");
+    machine.start();
+    ASSERT_TRUE(eventually([&] { return hung.runs > 2; }));
+    starting.hang = true;
+    starting.hang_at_start = &hung;
+    EXPECT_FALSE(machine.edit("newthread extra 3000000\nloadrt test-life names=z " +
+                              starting.argument() + "\naddf z extra"));
+    ASSERT_TRUE(eventually([&] { return starting.hanging.load(); }));
+    hung.hang = false;
+    starting.hang = false;
+    ASSERT_TRUE(eventually([&] { return !starting.hanging; }));
+    const auto beat = machine.number("fast.threadbeat");
+    ASSERT_TRUE(eventually([&] { return machine.number("fast.threadbeat") > beat + 20; }));
+    ASSERT_TRUE(eventually([&] {
+        return machine.edit("loadrt test-counter names=e\naddf e slow");
+    })) << machine.said;
+    machine.must("newthread extra 3000000\nunload test-life");
+}
+
 }  // namespace
 }  // namespace hal::test

@@ -175,7 +175,9 @@ bool OpenTransaction::carry_out_checked(Diagnostics& diagnostics) {
     if (!threads.make(diagnostics)) return false;
     if (!threads.end(edit_->removed().threads, diagnostics)) return false;
     if (!threads.synchronise(*edit_, before_, diagnostics)) return false;
-    threads.free_stuck();
+    if (threads.end_orphans()) {  // they may run one of these plans
+        threads.free_stuck();
+    }
     make_abandoned_safe(state_.model, *edit_);
     return true;
 }

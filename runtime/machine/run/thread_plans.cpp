@@ -465,8 +465,10 @@ bool ThreadPlans::swap(Edit& edit, EarlierValues& before, const Functions& witho
             running = std::move(plan);
         }
     }
-    std::erase_if(plans_,
-                  [&](const auto& entry) { return !is_in_model(state_.model, entry.first); });
+    // a thread that could not be ended runs its plan when it gets CPU time again
+    std::erase_if(plans_, [&](const auto& entry) {
+        return !is_in_model(state_.model, entry.first) && !core(entry.first);
+    });
     if (state_.options.observer) {
         describe_functions();
     }
