@@ -3,6 +3,7 @@
 
 #include "hal/component.hpp"
 #include "hal/limit.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -95,7 +96,8 @@ struct Spindle : hal::Component {
         const double period_s = simulated ? cycle.seconds() : 1.0;
         const double up = limit_or_none(accel[gear]) * period_s;
         const double down = limit_or_none(decel[gear]) * period_s;
-        const double drive = at_speed ? wanted : next(speed, wanted, up, down);
+        const bool there = at_speed && std::fabs(wanted - speed) <= speed_tolerance[gear];
+        const double drive = there ? wanted : next(speed, wanted, up, down);
         const double turning = simulated ? drive : speed;
         rpm = turning + 0.0;  // never -0
         const bool too_fast = wanted * turning <= 0.0 ||
@@ -104,7 +106,10 @@ struct Spindle : hal::Component {
         // a spindle turned by hand does not switch the drive on
         forward = drive > 0.0 && (wanted != 0.0 || forward);
         reverse = drive < 0.0 && (wanted != 0.0 || reverse);
-        output = (std::fabs(drive) + offset[gear]) * scale[gear];
+        const double highest = std::min(ceiling(gear, down), std::fabs(drive));
+        commanded_ = command_within(highest, wanted != 0.0);
+        const double scaled = (commanded_ + offset[gear]) * scale[gear];
+        output = std::isfinite(scaled) ? scaled : 0.0;
     }
 
 private:
@@ -137,6 +142,19 @@ private:
                              command);
     }
 
+    /// Returns the highest magnitude of the command: `max` of the gear, or what falls to it by
+    /// `down` per cycle from a command above a lowered one. [realtime]
+    double ceiling(std::size_t gear, double down) const noexcept {
+        return std::max(limit_or_none(max[gear]), commanded_ - down);
+    }
+
+    /// Returns the magnitude of the command to the drive: `highest`, which on the way to 0 does not
+    /// rise with what the encoder measures, and 0 while the drive is off. [realtime]
+    double command_within(double highest, bool runs) const noexcept {
+        if (!forward && !reverse) return 0.0;
+        return runs ? highest : std::min(highest, commanded_);
+    }
+
     /// One step from `speed` towards `wanted`; a change of direction stops at 0 for a cycle.
     static double next(double speed, double wanted, double up, double down) noexcept {
         const double sign = speed != 0.0 ? speed : wanted;
@@ -149,6 +167,9 @@ private:
         rpm_abs =
             smooth ? rpm_abs + (magnitude - rpm_abs) * std::min(lpf * period_s, 1.0) : magnitude;
     }
+
+    double commanded_ = 0.0;  // magnitude of the last command to the drive, in rpm
+    hal::Retained retained_{*this, {{"commanded", commanded_}}};
 };
 
 }  // namespace
@@ -162,10 +183,16 @@ limited to `min` and `max` of the gear (`min` does not apply at 0), or 0 while `
 decelerates to 0. `max`, `accel` and `decel` have no effect while they are 0, the default.
 
 With `simulate-encoder` the commanded speed changes by `accel` and `decel` rpm per second and counts
-as the speed of the spindle. With an encoder it is the measured speed plus `accel`, or minus
-`decel`, up to the target, so a loaded spindle gets more time. While `at-speed` is TRUE it is the
-target. `at-speed` compares the speed at the beginning of the cycle with `commanded-speed` before
-`min` and `max`.
+as the speed of the spindle; so it does after a change of `min`, `max` or the gear. With an encoder
+it is the measured speed plus `accel`, or minus `decel`, up to the target, so a loaded spindle gets
+more time. While `at-speed` is TRUE and the target is within `speed-tolerance`, it is the target.
+`at-speed` compares the speed at the beginning of the cycle with `commanded-speed` before `min` and
+`max`.
+
+Whatever the encoder measures, the commanded speed is at most `max`; above a lowered `max` it falls
+by `decel` per second, with an encoder by at least `decel` per cycle. On the way to 0 it does not
+rise, and while `forward` and `reverse` are FALSE it is 0. An `output` that is not a finite number,
+because of `scale` or `offset`, is 0.
 
 `brake` is TRUE while the spindle turns (above `zero-tolerance`) too fast or in the wrong direction. `numgears=N` gives N gears with a pin of
 each kind; `select-gear` is the gear, or, while it is 0, the highest `select.N` that is TRUE. `spindle-rpm-abs` is filtered by
@@ -175,8 +202,12 @@ r += (speed - r) * spindle-lpf * period while at speed.
 remains TRUE while a spindle that turns backwards decelerates to a stop, like `forward` (LinuxCNC:
 it becomes FALSE at once, and the spindle coasts). A `select-gear` beyond the last gear is the last
 one (LinuxCNC reads pins that do not exist). A NaN or infinite speed counts as 0 (LinuxCNC: the
-outputs remain NaN). While the machine is stopped, `output` is 0, and `forward` and `reverse` are
-FALSE (LinuxCNC: they keep their values).
+outputs remain NaN), and an `output` that would be NaN or infinite is 0. Only a spindle that the
+drive turns has an `output` on the way to 0, it does not rise with the measured speed, and nothing
+measured raises it above `max` (LinuxCNC: the measured speed minus `decel` is sent). A change of
+`min`, `max` or the gear at speed follows `accel` and `decel` (LinuxCNC: it jumps). While the
+machine is stopped, `output` is 0, and `forward` and `reverse` are FALSE (LinuxCNC: they keep their
+values).
 
     loadrt spindle names=router
     addf router servo

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """The intended differences; see expected.py."""
+
 import math
 
 from .expected import behaviour, inventory
@@ -446,15 +447,15 @@ behaviour(
 )
 
 
-# The difference from 0 is 0.1 + 1e-9, which in single precision is the tolerance.
+# The difference from the command is 0.125 + 1e-9, which in single precision is the tolerance.
 AT_TOLERANCE = (
     "spindle",
     {
-        "spindle.0.actual-speed": [(0.1 + 1e-9) / 60, 0.0],
-        "spindle.0.commanded-speed": [0.0],
+        "spindle.0.actual-speed": [(1.125 + 1e-9) / 60, 1 / 60],
+        "spindle.0.commanded-speed": [1.0],
         "spindle.0.enable": [True],
         "spindle.0.decel.0": [0.01],
-        "spindle.0.speed-tolerance.0": [0.1, 0.0],
+        "spindle.0.speed-tolerance.0": [0.125, 0.0],
         "spindle.0.spindle-lpf": [10.0],
     },
     {},
@@ -511,6 +512,52 @@ behaviour(
             "spindle.0.enable": [True],
             "spindle.0.accel.0": [1e-300],
             "spindle.0.speed-tolerance.0": [0.0],
+        },
+        {},
+    ),
+    lasts=True,
+)
+
+
+def spindle_target(v):
+    return v["commanded-speed"] if v["enable"] else 0.0
+
+
+def spindle_is_limited(v):
+    magnitude = abs(spindle_target(v))
+    return magnitude > 0 and (magnitude < v["min.0"] or magnitude > v["max.0"] > 0)
+
+
+behaviour(
+    "spindle",
+    "output",
+    lambda v: spindle_target(v) == 0 or 60 * abs(v["actual-speed"]) > v["max.0"] > 0,
+    "the spindle is off or stops; the measured speed is above `max`",
+    "0 while it is off, does not rise on the way to 0, is at most `max`",
+    "the measured speed minus `decel`",
+    "an encoder must not drive a spindle",
+    (
+        "spindle",
+        {"spindle.0.actual-speed": [200.0], "spindle.0.decel.0": [100.0]},
+        {},
+    ),
+)
+behaviour(
+    "spindle",
+    ".*",
+    spindle_is_limited,
+    "`min`, `max` or the gear changes at speed; `commanded-speed` is beyond them",
+    "follows `accel` and `decel`",
+    "jumps while `at-speed`",
+    "a spindle must not jump",
+    (
+        "spindle",
+        {
+            "spindle.0.simulate-encoder": [True],
+            "spindle.0.commanded-speed": [1000.0],
+            "spindle.0.enable": [True],
+            "spindle.0.decel.0": [100.0],
+            "spindle.0.max.0": [0.0] * 10 + [500.0],
         },
         {},
     ),
