@@ -68,7 +68,7 @@ struct PxmcAxis : hal::Component {
         *this, "overspeed",
         "measured speed, as a multiple of max-speed, at which the axis faults; 0: not monitored"};
     hal::In<double> speed_filter{
-        *this, "speed-filter", "time constant of actual-speed", {.unit = "s"}};
+        *this, "speed-filter", "time constant of actual-speed, 0 to 60", {.unit = "s"}};
     hal::In<double> window{
         *this, "position-window",
         "distance to the target at which busy ends; 0: busy ends with the trajectory"};
@@ -106,7 +106,7 @@ struct PxmcAxis : hal::Component {
         motion::Limits limits;
         const bool sound =
             motion::Limits::from(max_speed, max_acceleration, 0.0, max_jerk, limits) &&
-            min_position <= max_position;
+            min_position <= max_position && monitors_are_valid();
 
         std::uint32_t found = none;
         if (!sound) {
@@ -128,6 +128,8 @@ struct PxmcAxis : hal::Component {
     }
 
 private:
+    static constexpr double max_speed_filter_s = 60.0;
+
     /// Switches the axis on or off. `found`: what is wrong with the inputs; it is an error only
     /// while the axis is on. `cleared`: a reset, which works once nothing is wrong.
     void update_state(std::uint32_t found, bool cleared, const motion::Limits& limits) noexcept {
@@ -147,6 +149,13 @@ private:
             code_ = found;
         }
         was_on_ = on && code_ == none;
+    }
+
+    /// Returns whether the parameters of the supervision are valid: a negative limit, or a filter
+    /// that passes no speed, would switch it off.
+    bool monitors_are_valid() const noexcept {
+        return max_following_error >= 0.0 && position_margin >= 0.0 && overspeed >= 0.0 &&
+               speed_filter >= 0.0 && speed_filter <= max_speed_filter_s;
     }
 
     void measure(double dt) noexcept {
@@ -318,7 +327,7 @@ axis holds its current position.
 | 2, 3 | measured position below `min-position` or above `max-position` by more than `position-margin`, and moving outwards |
 | 4 | measured speed above `overspeed` * `max-speed` |
 | 5 | the feedback is NaN or infinite |
-| 6 | a limit is 0, negative or NaN, or the output is NaN because of a gain |
+| 6 | `max-speed` or `max-acceleration` is 0, a limit other than `max-output` is negative, `min-position` is above `max-position`, one of these is NaN, `speed-filter` is not 0 to 60 s, or the output is NaN because of a gain |
 
     loadrt pxmc_axis names=left-wheel
     addf left-wheel.do-control servo

@@ -76,8 +76,10 @@ struct SafeLimit : hal::Component {
         "filter-time",
         "time for which a limit may be exceeded; adds to the reaction time",
         {.unit = "s"}};
-    hal::Param<double> speed_filter{
-        *this, "speed-filter", "time constant of the speed computed from position", {.unit = "s"}};
+    hal::Param<double> speed_filter{*this,
+                                    "speed-filter",
+                                    "time constant of the speed computed from position, 0 to 60",
+                                    {.unit = "s"}};
     hal::Param<double> stop_deceleration{*this,
                                          "stop-deceleration",
                                          "deceleration of the command in stops 1 and 2",
@@ -151,6 +153,8 @@ struct SafeLimit : hal::Component {
     }
 
 private:
+    static constexpr double max_speed_filter_s = 60.0;  // a longer one sees no speed in time
+
     static bool usable(double x) noexcept { return std::fabs(x) <= 1e15; }
 
     bool parameters_sound() const noexcept {
@@ -159,6 +163,7 @@ private:
         const std::uint32_t reactions[] = {position_reaction, speed_reaction, slew_reaction};
         return min_position <= max_position && stop_deceleration > 0.0 &&
                std::ranges::all_of(amounts, [](double amount) { return amount >= 0.0; }) &&
+               speed_filter >= 0.0 && speed_filter <= max_speed_filter_s &&
                std::ranges::max(reactions) <= stop_0;
     }
 
