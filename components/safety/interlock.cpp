@@ -31,8 +31,10 @@ struct Interlock : hal::Component {
     hal::In<std::uint64_t> bypass{*this, "bypass-mask",
                                   "bit n: condition n is bypassed while bypass-enable is TRUE"};
     hal::In<bool> bypass_enable{*this, "bypass-enable", "TRUE enables the bypass (key switch)"};
-    hal::OptionalLimit bypass_time{
-        *this, "bypass-time", "maximum duration of a bypass; 0: no limit", {.unit = "s"}};
+    hal::OptionalLimit bypass_time{*this,
+                                   "bypass-time",
+                                   "maximum duration of a bypass; 0: no limit; negative: no bypass",
+                                   {.unit = "s"}};
     hal::In<bool> acknowledge{*this, "acknowledge",
                               "a rising edge turns off the horn and stops the flashing"};
     hal::In<bool> reset{*this, "reset",
@@ -98,8 +100,9 @@ struct Interlock : hal::Component {
 private:
     /// Returns whether the key switch is on, and its time is not over.
     bool may_bypass(double dt) noexcept {
+        const double longest = bypass_time;  // read in each cycle: its last valid value may apply
         bypass_for_ = bypass_enable ? std::min(bypass_for_ + dt, 1e9) : 0.0;
-        return bypass_enable && !(bypass_time > 0.0 && bypass_for_ > bypass_time);
+        return bypass_enable && (longest == 0.0 || bypass_for_ <= longest);
     }
     /// ok waits for a reset at the start, and after a stop of the runtime, which wrote the safe
     /// value.
@@ -211,7 +214,7 @@ Masks have a bit per condition (bit 0 is `in-00`) and may be written in hexadeci
 | invert-mask | it is good when FALSE |
 | latch-mask | once bad it is latched until a rising edge of `reset` |
 | warn-mask | it affects `warning` only, not `ok` |
-| bypass-mask | it is not monitored while `bypass-enable` is TRUE (for at most `bypass-time`) |
+| bypass-mask | it is not monitored while `bypass-enable` is TRUE (for at most `bypass-time`; never if it is negative) |
 
 | lamp-## | |
 | --- | --- |
