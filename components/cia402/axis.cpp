@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "axis.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -25,6 +26,18 @@ bool by_torque(Mode m) noexcept { return m == Mode::profile_torque || m == Mode:
 /// Returns true for modes with a halt bit (bit 8).
 bool can_halt(Mode m) noexcept {
     return m != Mode::cyclic_position && m != Mode::cyclic_velocity && m != Mode::cyclic_torque;
+}
+
+/// Returns half the range of a counter with `bits` valid bits; 0 and more than 32 count as 32.
+double half_range(unsigned bits) noexcept {
+    const bool is_whole = bits == 0 || bits > 32;
+    return std::ldexp(1.0, is_whole ? 31 : static_cast<int>(bits) - 1);
+}
+
+/// Returns true for a count that is half the range of the counter away from another one, or more:
+/// the counter shows the same for both directions. Also for NaN.
+bool is_ambiguous(double count, double from, unsigned bits) noexcept {
+    return !(std::fabs(count - from) < half_range(bits));
 }
 
 /// Falls smoothly from 1 to 0 while x goes from 0 to 1.
@@ -148,6 +161,11 @@ static const Factor* unsound_factor(const AxisRules& rules) noexcept {
     return nullptr;
 }
 
+/// Returns the limit of a supervision that is negative; 0: none is.
+static double negative_limit(const AxisRules& rules) noexcept {
+    return std::min({rules.max_step, rules.max_following_error, 0.0});
+}
+
 /// Decides whether the axis is to be enabled.
 void Axis::decide(const AxisCommand& command, const AxisRules& rules) noexcept {
     const bool whole = missing_ == Cause::none;
@@ -171,11 +189,13 @@ void Axis::decide(const AxisCommand& command, const AxisRules& rules) noexcept {
 }
 
 void Axis::request_enable(const AxisRules& rules) noexcept {
-    const Factor* const factor = unsound_factor(rules);
-    wanted_ = factor == nullptr;
-    if (!wanted_) {
+    wanted_ = true;
+    if (const Factor* const factor = unsound_factor(rules)) {
         fail(Cause::bad_factor, Request::enable);
         failure_.value = factor->ratio();
+    } else if (const double limit = negative_limit(rules); limit < 0.0) {
+        fail(Cause::bad_limit, Request::enable);
+        failure_.value = limit;
     }
 }
 
@@ -373,6 +393,7 @@ void Axis::follow_position(const AxisCommand& command, const AxisRules& rules, T
         joined_at_ = now;
     }
     joined_ = asked;
+    const double before = commanded_;
     commanded_ = asked;
     if (offset_ != 0.0) {
         const double left =
@@ -380,8 +401,14 @@ void Axis::follow_position(const AxisCommand& command, const AxisRules& rules, T
         commanded_ += offset_ * left;
         offset_ = left == 0.0 ? 0.0 : offset_;
     }
-    if (is_too_far(commanded_, rules)) return fail(Cause::bad_command, commanded_, 0.0);
-    const auto count = static_cast<std::int64_t>(std::llround(commanded_ * rules.position.ratio()));
+    const double ratio = rules.position.ratio();
+    const auto measured = static_cast<double>(counter_.count());
+    if (is_too_far(commanded_, rules) ||
+        is_ambiguous(commanded_ * ratio, measured, rules.counter_bits) ||
+        is_ambiguous(commanded_ * ratio, before * ratio, rules.counter_bits)) {
+        return fail(Cause::bad_command, commanded_, 0.0);
+    }
+    const auto count = static_cast<std::int64_t>(std::llround(commanded_ * ratio));
     orders_.target_position =
         Counter::low_bits(static_cast<std::uint32_t>(count), rules.counter_bits);
     const double error = std::fabs(commanded_ - position_);
@@ -422,6 +449,16 @@ void Axis::move_by_position(const AxisCommand& command, const AxisRules& rules, 
     orders_.interpolation = orders_.target_position;
 }
 
+/// Returns true for a set-point that the drive could not distinguish from one in the other
+/// direction, or that is not a number.
+bool Axis::is_unreachable(const AxisCommand& command, double count,
+                          const AxisRules& rules) const noexcept {
+    if (command.relative) return is_ambiguous(count, 0.0, 32);
+    const auto measured = static_cast<double>(counter_.count());
+    const double from = command.immediate ? measured : last_set_point_;
+    return is_ambiguous(count, from, rules.counter_bits) || is_too_far(command.position, rules);
+}
+
 /// Queues the position of a command that begins now as a set-point.
 void Axis::queue_set_point(const AxisCommand& command, const AxisRules& rules) noexcept {
     const double count = command.position * rules.position.ratio();
@@ -431,7 +468,7 @@ void Axis::queue_set_point(const AxisCommand& command, const AxisRules& rules) n
         }
         return;
     }
-    if (!(std::fabs(count) < farthest_count)) {
+    if (is_unreachable(command, count, rules)) {
         fail(Cause::bad_command, command.position, 0.0);
         failure_.request = Request::go;
         return;
@@ -442,7 +479,10 @@ void Axis::queue_set_point(const AxisCommand& command, const AxisRules& rules) n
     p.relative = command.relative;
     p.immediate = command.immediate;
     p.blend = command.blend;
-    if (set_points_.push(p)) return;
+    if (set_points_.push(p)) {
+        last_set_point_ = command.relative ? last_set_point_ + count : count;
+        return;
+    }
     if (p.immediate) {  // the sum of the distances is out of range
         fail(Cause::bad_command, command.position, 0.0);
         failure_.request = Request::go;
@@ -456,8 +496,12 @@ void Axis::queue_set_point(const AxisCommand& command, const AxisRules& rules) n
 void Axis::move_by_set_points(const AxisCommand& command, const AxisRules& rules,
                               Time now) noexcept {
     const bool by_set_points = orders_.mode == Mode::profile_position;
+    if (set_points_.done()) {
+        last_set_point_ = static_cast<double>(counter_.count());
+    }
     if (!by_set_points || !active_) {
         set_points_.clear();
+        last_set_point_ = static_cast<double>(counter_.count());
         const bool is_reached = (in_.statusword & status::target_reached) != 0;
         target_reached_ = is_reached && !(by_set_points && set_points_.discarded());
     }
@@ -515,10 +559,12 @@ void Axis::set_mode_bits(const AxisCommand& command) noexcept {
     }
 }
 
-/// Fails when the commands or the factors of an axis in motion are not valid numbers.
+/// Fails when the commands, the factors or the limits of an axis in motion are invalid.
 void Axis::check_numbers(const AxisCommand& command, const AxisRules& rules) noexcept {
     if (const Factor* const f = unsound_factor(rules)) {
         fail(Cause::bad_factor, f->ratio(), 0.0);
+    } else if (const double limit = negative_limit(rules); limit < 0.0) {
+        fail(Cause::bad_limit, limit, 0.0);
     } else if (!std::isfinite(command.velocity)) {
         fail(Cause::bad_command, command.velocity, 0.0);
     } else if (!std::isfinite(command.torque)) {

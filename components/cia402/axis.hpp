@@ -81,9 +81,9 @@ struct AxisRules {
     Time homing = 0;  ///< timeout of homing, ns; 0: none
     /// with max_step 0: time to blend out a command away from the axis at enabling, ns
     Time blend = one_second / 2;
-    /// largest step of position in one cycle, units; 0: not checked
+    /// largest step of position in one cycle, units; 0: not checked, negative: a failure
     double max_step = 0.0;
-    double max_following_error = 0.0;  ///< units; 0: not checked
+    double max_following_error = 0.0;  ///< units; 0: not checked, negative: a failure
     bool auto_reset = false;  ///< enable also resets a failure
 };
 
@@ -174,6 +174,7 @@ private:
     void run_homing(const AxisCommand&, const AxisRules&, Time now) noexcept;
     void adopt_failure(const Failure&) noexcept;
     static bool is_too_far(double position, const AxisRules&) noexcept;
+    bool is_unreachable(const AxisCommand&, double count, const AxisRules&) const noexcept;
     void reject_step(double step, double max_step) noexcept;
     void follow_position(const AxisCommand&, const AxisRules&, Time now) noexcept;
     void check_numbers(const AxisCommand&, const AxisRules&) noexcept;
@@ -204,6 +205,7 @@ private:
     // the command of the last cycle; its distance from the feedback at enabling
     double joined_ = 0.0;
     double offset_ = 0.0;
+    double last_set_point_ = 0.0;  // pp: where the queued set-points end, in counts
     Time last_ = 0;
     Time mode_since_ = 0;
     Time joined_at_ = 0;

@@ -74,6 +74,7 @@ constexpr CauseRow cause_rows[] = {
     {Number::none, "", "function write-all does not run"},  // unwritten
     {Number::none, "", "function read-all does not run"},  // unread
     {Number::none, "", "more than 16 set-points queued"},  // set_point_lost
+    {Number::value, ": {}", "max-step or max-following-error is negative"},  // bad_limit
 };
 static_assert(std::size(cause_rows) == causes);
 
@@ -231,9 +232,10 @@ Sentences::Sentences() {
     constexpr unsigned steps = static_cast<unsigned>(Step::fault_reset) + 1;
     for (unsigned r = 0; r <= static_cast<unsigned>(Request::go); ++r) {
         const auto request = static_cast<Request>(r);
-        for (const Cause cause : {Cause::lost, Cause::following_error, Cause::bad_command,
-                                  Cause::bad_factor, Cause::homing_timeout, Cause::not_enabled,
-                                  Cause::unwritten, Cause::unread, Cause::set_point_lost}) {
+        for (const Cause cause :
+             {Cause::lost, Cause::following_error, Cause::bad_command, Cause::bad_factor,
+              Cause::homing_timeout, Cause::not_enabled, Cause::unwritten, Cause::unread,
+              Cause::set_point_lost, Cause::bad_limit}) {
             add(cause, request);
         }
         for (unsigned step = 0; step < steps; ++step) {

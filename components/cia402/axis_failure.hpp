@@ -42,7 +42,8 @@ enum class Cause : std::uint8_t {
     mode_rejected = 5,     ///< the drive does not display the commanded mode
     following_error = 6,
     step_rejected = 7,     ///< the step of position-cmd is too large
-    bad_command = 8,      ///< not a number, or beyond the range of the counts
+    /// not a number, beyond the range of the counts, or so far that its direction is unclear
+    bad_command = 8,
     bad_factor = 9,       ///< a factor is 0 or not a number
     homing_error = 10,    ///< reported by the drive
     homing_timeout = 11,
@@ -51,8 +52,9 @@ enum class Cause : std::uint8_t {
     unwritten = 14,       ///< the function that sends the orders does not run
     unread = 15,          ///< the function that reads the feedback does not run
     set_point_lost = 16,  ///< pp: no space for another set-point
+    bad_limit = 17,       ///< the limit of a supervision is negative
 };
-inline constexpr unsigned causes = 17;
+inline constexpr unsigned causes = 18;
 
 /// A failure, as stored in the cycle.
 struct Failure {

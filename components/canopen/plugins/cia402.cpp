@@ -323,16 +323,23 @@ private:
         return all;
     }
 
+    /// Reads the parameters. A changed position scale waits until the axis is off: it would move
+    /// the target of the drive. An invalid one is a fault of the axis.
     void read_rules() noexcept {
-        rules_.position = {position_scale, position_divisor};
+        const Factor wanted{position_scale, position_divisor};
+        if (!has_rules_ || !axis_.enabled() || !wanted.sound()) {
+            rules_.position = wanted;
+            rules_.counter_bits = counter_bits;
+            has_rules_ = true;
+        }
+        const Factor position = rules_.position;
         rules_.velocity =
-            velocity_scale != 0.0 ? Factor{velocity_scale, velocity_divisor} : rules_.position;
+            velocity_scale != 0.0 ? Factor{velocity_scale, velocity_divisor} : position;
         rules_.acceleration = acceleration_scale != 0.0
                                   ? Factor{acceleration_scale, acceleration_divisor}
                                   : rules_.velocity;
         rules_.torque = {torque_scale, 1.0};
         rules_.vl = {vl_scale, 1.0};
-        rules_.counter_bits = counter_bits;
         rules_.limits = {time(step_timeout), time(stop_timeout)};
         rules_.homing = time(homing_timeout);
         rules_.blend = time(blend_time);
@@ -369,6 +376,7 @@ private:
     const Sentences& made_ = sentences();
     Axis axis_;
     AxisRules rules_;
+    bool has_rules_ = false;
     Cause reported_ = Cause::none;
     // set by interrupt() in any thread, taken by act()
     std::atomic<bool> interrupted_{false};
@@ -418,6 +426,13 @@ state, one transition per cycle.
   waits for its end, and returns to `mode`. Then `position-fb` is the position counted by the drive.
 * `position-fb` = counts * `position-scale-divisor` / `position-scale`; it does not wrap with the
   drive's counter.
+* A change of `position-scale`, `position-scale-divisor` or `counter-bits` applies while the axis is
+  not enabled, and waits for that otherwise: it would move the target of the drive. 0 or NaN is a
+  fault at once.
+* A position so far away that the drive's counter would show the same for the other direction (half
+  its range, 2^31 counts with 32 `counter-bits`) is a fault: a `position-cmd` that far from the
+  position of the drive or from the command of the cycle before, a set-point that far from the
+  previous one, a relative one of that distance.
 
 The drive latches positions at its touch probes (60B8h to 60BDh) by itself, between two cycles:
 
@@ -459,7 +474,7 @@ sends, with the controller of the axis between the two.
 | 5 | the drive does not display the commanded mode |
 | 6 | following error above `max-following-error` |
 | 7 | `position-cmd` stepped farther than `max-step`, or was that far from `position-fb` at enabling |
-| 8 | a command is not a number, or too large |
+| 8 | a command is not a number, or too large: half the range of the drive's counter away |
 | 9 | a scale is 0 or not a number |
 | 10 | the drive reports a homing error |
 | 11 | homing took longer than `homing-timeout` |
@@ -468,6 +483,7 @@ sends, with the controller of the axis between the two.
 | 14 | `write-all` does not run |
 | 15 | `read-all` does not run |
 | 16 | pp: 16 set-points were queued already; the new one is lost |
+| 17 | `max-step` or `max-following-error` is negative |
 
 `failed-step`: 0 wait, 1 shutdown, 2 switch on, 3 enable operation, 4 disable operation, 5 disable
 voltage, 6 quick stop, 7 fault reset. `state`: 0 not ready to switch on, 1 switch on disabled, 2
