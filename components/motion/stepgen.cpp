@@ -348,19 +348,21 @@ private:
                static_cast<double>(std::max<std::int64_t>(1, ticks(step_length) + pause) * tick_ns);
     }
 
-    /// A command that is not a number brakes to a standstill.
+    /// Returns the rate for a command: within maxvel, reached within maxaccel also from above a
+    /// lowered maxvel, and no higher than the pulse timing permits. A command that is not a number
+    /// brakes to a standstill.
     double limited(double wanted, std::int64_t tick_ns, double dt) noexcept {
         if (!std::isfinite(wanted)) {
             wanted = 0.0;
         }
-        double highest = highest_rate(tick_ns);
         if (const double asked = std::fabs(max_velocity * scale()); asked > 0.0) {
-            highest = std::min(highest, asked);
+            wanted = std::clamp(wanted, -asked, asked);
         }
         if (const double a = acceleration(); a > 0.0) {
             wanted = std::clamp(wanted, frequency - a * dt, frequency + a * dt);
         }
-        return std::clamp(wanted, -highest, highest);
+        const double possible = highest_rate(tick_ns);
+        return std::clamp(wanted, -possible, possible);
     }
 
     double acceleration() const noexcept { return std::fabs(max_acceleration * scale()); }
@@ -479,8 +481,8 @@ on different CPUs.
 `position-cmd` (ctrl_type=p) is followed as fast as `maxvel` and `maxaccel` allow without
 overshooting a constant command: v = √(2 a e + (a T/2)²) - a T/2 for a distance e, plus the speed of
 the command. `velocity-cmd` (ctrl_type=v) is followed within the same limits. With `maxaccel` the
-speed changes linearly from one update to the next, without jumps. A command that is NaN or infinite
-brakes to a standstill within it. There is at most one step per period of the fast thread; a step
+speed changes linearly from one update to the next, without jumps, also after a change of `maxvel` or
+`position-scale`. A command that is NaN or infinite brakes to a standstill within it. There is at most one step per period of the fast thread; a step
 that must wait for one of the times below is delayed, never lost. A step occurs when the position
 passes the midpoint between two steps.
 
