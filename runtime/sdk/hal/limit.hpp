@@ -78,9 +78,17 @@ private:
         switch (applies) {
         case Applies::initial_value:
             return "a limit is not a number and never was one; its default applies";
-        case Applies::nothing: return "a limit is not a number and never was one; 0 applies";
+        case Applies::nothing: return nothing_applies();
         default: return "a limit is not a number; its last valid value applies";
         }
+    }
+
+    /// What applies before the first number; where 0 means that there is no limit, not that.
+    static const char* nothing_applies() noexcept {
+        if (zero == ZeroLimit::disables) {
+            return "a limit is not a number and never was one; nothing passes";
+        }
+        return "a limit is not a number and never was one; 0 applies";
     }
 
     double last_valid() const noexcept {

@@ -654,8 +654,11 @@ TEST_P(LimitPin, Lets_nothing_beyond_its_default_pass_before_it_was_a_number) {
         } else if (row.first != 0.0) {
             EXPECT_EQ(text, begin + "its default applies");
         } else {
-            EXPECT_TRUE(text == begin + "its default applies" || text == begin + "0 applies")
-                << text;
+            const std::vector<std::string> ends{"its default applies", "0 applies",
+                                                "nothing passes"};
+            EXPECT_TRUE(std::ranges::any_of(ends, [&](const std::string& end) {
+                return text == begin + end;
+            })) << text;
         }
     }
 }
@@ -666,6 +669,14 @@ TEST(LimitText, States_that_0_applies_when_the_default_is_not_a_limit) {
     limit.set("max", nan);
     limit.run("");
     EXPECT_EQ(faults.text, "a limit is not a number and never was one; 0 applies");
+}
+
+TEST(LimitText, States_that_nothing_passes_where_0_means_that_there_is_no_limit) {
+    Faults faults;
+    Instance spindle("spindle", {}, {{"hal.faults/1", &faults.record}});
+    spindle.set("max.0", nan);
+    spindle.run("");
+    EXPECT_EQ(faults.text, "a limit is not a number and never was one; nothing passes");
 }
 
 INSTANTIATE_TEST_SUITE_P(Every_limit, LimitPin, testing::ValuesIn(rows), [](const auto& row) {
