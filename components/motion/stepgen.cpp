@@ -509,9 +509,10 @@ missing function.
 
 **Differences from LinuxCNC:** steps occur in different periods. A command with constant speed is
 followed with a lag of one update (LinuxCNC: two and a half), and braking starts as late as
-possible. `position-fb` is exact (LinuxCNC: fixed point with a resolution of 2e-8 steps). Without
-`maxaccel` the speed changes immediately (LinuxCNC: within an update). `dir` changes before the
-first step back (LinuxCNC: when the speed changes its sign, even if no step follows).
+possible. Above a lowered `maxvel` a position command brakes within `maxaccel` (LinuxCNC: it runs at
+`maxvel` at once). `position-fb` is exact (LinuxCNC: fixed point with a resolution of 2e-8 steps).
+Without `maxaccel` the speed changes immediately (LinuxCNC: within an update). `dir` changes before
+the first step back (LinuxCNC: when the speed changes its sign, even if no step follows).
 
     loadrt stepgen step_type=0,0 ctrl_type=p,v
     addf stepgen.make-pulses base-thread
