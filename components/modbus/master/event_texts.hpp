@@ -70,6 +70,10 @@ public:
     }
     static MessageSubject subject(const EventRecord& record, const std::string&) {
         const int event = static_cast<int>(record.event);
+        if (record.event == Event::stopping) {
+            // each cause is a message of its own, and is not counted with another one
+            return {std::to_string(event * 65536), std::to_string(record.value)};
+        }
         return {std::to_string(event * 65536 + static_cast<int>(record.telegram & 0xffff)),
                 std::to_string(record.slave)};
     }

@@ -669,6 +669,25 @@ TEST_F(BroadcastStop, Ends_on_a_line_that_accepts_nothing) {
     EXPECT_EQ(sent(broadcast), 0);
 }
 
+TEST(EventTexts, Stops_with_different_reasons_are_not_counted_as_one) {
+    World w("[bus]\nlink = sim:x\n[slave 1 a]\nread r = holding 0\nstop = holding 50 7\n");
+    const EventTexts texts(w.bus(), w.plan());
+    std::vector<std::string> printed;
+    hal::MessageLog log{"m", [&](const std::string& line) { printed.push_back(line); }};
+    for (const StopReason reason :
+         {StopReason::fault, StopReason::estop, StopReason::fault, StopReason::unload}) {
+        const EventRecord record{Event::stopping, 0, 0, static_cast<std::int64_t>(reason)};
+        const std::string line = texts.line(record);
+        log.print(EventTexts::subject(record, line), line, 0);
+    }
+    std::vector<std::string> expected;
+    for (const StopReason reason :
+         {StopReason::fault, StopReason::estop, StopReason::fault, StopReason::unload}) {
+        expected.push_back("m: sends the stop telegrams: " + std::string(to_string(reason)) + "\n");
+    }
+    EXPECT_EQ(printed, expected);
+}
+
 TEST(Master, A_broadcast_stop_is_a_request_to_unit_0_on_TCP) {
     std::vector<std::string> frames;
     World w(
