@@ -22,7 +22,7 @@ std::string log_line(const Frame&, std::string_view channel);
 bool parse_log_line(std::string_view line, Frame&);
 /// Appends the frames of a log: of can-utils or python-can, or candump's terminal format with
 /// times. Returns "", or the first line that is invalid and the reason; then the frames of the
-/// other lines are appended all the same.
+/// other lines are appended all the same. A last line without an end is invalid: it may be cut off.
 std::string parse_log(std::string_view text, std::vector<Frame>& frames);
 
 /// The frames of a capture in order of time: candump log, pcapng or pcap, distinguished by the

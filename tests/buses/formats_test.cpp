@@ -252,12 +252,28 @@ TEST(Capture, what_is_not_a_log_is_named) {
               "line 1: CAN XL frame; supported: classic and FD frames");
     EXPECT_EQ(problem("hello\n"),
               "line 1: invalid frame; expected `(1436509052.249713) can0 181#0102`");
+    EXPECT_EQ(problem("hello"),
+              "line 1: invalid frame; expected `(1436509052.249713) can0 181#0102`");
     EXPECT_EQ(problem("date Sat Nov 28 18:00:00 2026\nbase hex  timestamps absolute\n"),
               "not a candump log: it is a Vector log (.asc); convert it with: can_logconvert FILE "
               "FILE.log");
     EXPECT_EQ(problem("Timestamp:        0.000000    ID:      123    S Rx                DL:  0\n"),
               "not a candump log: it is the terminal output of python-can; record with: can_logger "
               "-f FILE.log");
+}
+
+TEST(Capture, a_last_line_without_an_end_is_not_a_frame) {
+    for (const char* const cut : {"(2.0) can0 201#0F00D007", "(2.0) can0 201#0F0", "(2.0) can0",
+                                  " (2.0)  can0  201   [4]  0F 00 D0 07"}) {
+        std::vector<Frame> frames;
+        EXPECT_EQ(parse_log(std::string("(1.0) can0 702#00\n") + cut, frames),
+                  "line 2: the last line has no end of line: its frame may be cut off; remove it, "
+                  "or end it if it is complete");
+        ASSERT_EQ(frames.size(), 1U) << cut;
+        EXPECT_TRUE(frames[0].same({0x702, {0}}));
+    }
+    std::vector<Frame> frames;
+    EXPECT_EQ(parse_log("(1.0) can0 702#00\n\r", frames), "") << "nothing was lost";
 }
 
 TEST(Capture, both_formats_give_back_what_was_recorded) {

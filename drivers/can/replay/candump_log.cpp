@@ -293,6 +293,17 @@ bool parse_log_line(std::string_view line, Frame& f) {
     return space != line.npos && space > 0 && parse_frame(line.substr(space + 1), f);
 }
 
+namespace {
+
+/// States that line `number` may have lost its last bytes, which its frame does not show.
+std::string no_end_of_line(std::size_t number) {
+    return "line " + std::to_string(number) +
+           ": the last line has no end of line: its frame may be cut off; remove it, or end it if "
+           "it is complete";
+}
+
+}  // namespace
+
 std::string parse_log(std::string_view text, std::vector<Frame>& frames) {
     std::string problem = other_format(text);
     if (!problem.empty()) return problem;
@@ -311,7 +322,14 @@ std::string parse_log(std::string_view text, std::vector<Frame>& frames) {
         const bool logged = parse_log_line(line, f);
         Screen screen = logged ? Screen::other : parse_screen_line(line, f);
         details = screen == Screen::frame && f.error;
-        if (logged || screen == Screen::frame) {
+        const bool is_frame = logged || screen == Screen::frame;
+        if (end == text.size() && (is_frame || !frames.empty())) {
+            if (problem.empty()) {
+                problem = no_end_of_line(number);
+            }
+            break;
+        }
+        if (is_frame) {
             const bool back = since && !frames.empty() && f.time_ns < frames.back().time_ns;
             frames.push_back(f);
             if (!back || !problem.empty()) continue;
