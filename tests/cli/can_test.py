@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 # packages: canopen
 """hal can and hal canopen: a bus by hand, between processes over udp: on this machine, and from captures."""
+
 import json
 import os
 import pty
@@ -46,7 +47,7 @@ DUMPED = """    0.000000  rx       000  [2] 01 02                    NMT start: 
     0.007000  rx       082  [8] 30 81 11 00 00 00 00 00  EMCY of node 2: life guard or heartbeat error (0x8130), error register 0x11
     0.008000  rx       7E5  [8] 04 01 00 00 00 00 00 00  LSS master: switch all to state 0x1
     0.009000  rx  18FF0001  [1] 00
-    0.010000  rx       100  [8] 00 00 00 00 64 32 00 00  TIME with a wrong length: it has 6 bytes
+    0.010000  rx       100  [8] 00 00 00 00 64 32 00 00  TIME: wrong length; expected: 6 bytes
     0.011000  rx       100  [6] 00 00 00 00 64 32        TIME 2019-04-27 00:00:00.000
     0.012000  rx       123  [2] FD+ AA BB
     0.013000  rx       701  [0] remote request, 0 bytes  node guarding: asks node 1
@@ -126,6 +127,39 @@ class Dump(Can):
             (20, None, 0),
             tuple(last["statistics"][key] for key in ("frames", "load_percent", "lost")),
         )
+
+    def test_error_frames_are_counted_as_errors(self):
+        self.write(
+            "errors.log",
+            "(0.00) can0 702#00\n(0.01) can0 20000080#0000000000000000\n(0.02) can0 080#\n",
+        )
+        done = self.run_program("can", "dump", "replay:errors.log")
+        self.assertEqual(3, done.stdout.count("\n"))
+        self.assertRegex(done.stderr, r"\n2 frames in .*, 1 errors, 0 lost\n$")
+        statistics = json.loads(
+            self.run_program("can", "dump", "replay:errors.log", "--json").stdout.splitlines()[-1]
+        )["statistics"]
+        self.assertEqual((2, 1), (statistics["frames"], statistics["errors"]))
+
+    def test_a_remote_request_in_place_of_a_data_frame_is_named(self):
+        self.write("remote.log", "(0.00) can0 602#R8\n(0.01) can0 602#40\n(0.02) can0 702#0506\n")
+        self.assertEqual(
+            [
+                "SDO to node 2: remote request; expected: a data frame",
+                "SDO to node 2: wrong length; expected: 8 bytes",
+                "heartbeat of node 2: wrong length; expected: 1 byte",
+            ],
+            [
+                line.rsplit("  ", 1)[1]
+                for line in self.run_program("can", "dump", "replay:remote.log").stdout.splitlines()
+            ],
+        )
+
+    def test_a_line_that_may_be_cut_off_is_no_frame(self):
+        self.write("cut.log", "(0.00) can0 702#00\n(0.01) can0 201#0F00D007")
+        sentence = "line 2: the last line has no end of line: its frame may be cut off; remove it, or end it if it is complete"
+        self.assertIn(sentence, self.bad_can("dump", "replay:cut.log"))
+        self.assertIn(sentence, self.bad_can("replay", "cut.log", self.bus))
 
     def test_the_flags_of_fd_frames(self):
         self.write("fd.log", "".join(f"(0.0{n}) can0 123##{n}AABB\n" for n in range(4)))

@@ -47,9 +47,14 @@ public:
                frames_[next_].time_ns + shift_ <= now;
              ++next_) {
             Frame f = frames_[next_];
+            if (f.error) {
+                Counting::add(counting_.errors);
+            }
             if (f.error ? !options_.error_frames : !filters_.pass(f)) continue;
             f.time_ns += shift_;
-            counting_.count_received(f);
+            if (!f.error) {
+                counting_.count_received(f);
+            }
             batch[count++] = f;
         }
         counting_.tick(now);

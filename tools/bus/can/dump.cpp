@@ -41,6 +41,7 @@ struct Source {
     std::string name;            ///< shown in each line; empty: the only bus
     std::int64_t to_wall = 0;    ///< offset from the time of its frames to the time of day
     std::uint64_t frames = 0;
+    std::uint64_t error_frames = 0;  ///< of `frames`; the link counts them as errors
     std::int64_t busy = 0;       ///< bus time taken by its frames
     FrameDecoder decoder = {};
     std::vector<can::Frame> received = std::vector<can::Frame>(256);
@@ -161,12 +162,13 @@ bool report(const DumpOptions& options, const Source& source, double seconds) {
     const can::Description& about = source.link->description();
     const can::Statistics s = source.link->statistics();
     const double load = static_cast<double>(source.busy) / 1e7 / seconds;
+    const std::uint64_t frames = source.frames - source.error_frames;
     if (options.json) {
         const std::string share = about.bit_rate ? fmt::format("{:.2f}", load) : "null";
         return print(fmt::format(
             R"({{"statistics":{{{}"frames":{},"seconds":{:.3f},"load_percent":{},"errors":{},"lost":{},"bus_offs":{},"state":"{}"}}}})"
             "\n",
-            bus_member(source), source.frames, seconds, share, s.errors, s.lost, s.bus_offs,
+            bus_member(source), frames, seconds, share, s.errors, s.lost, s.bus_offs,
             can::to_string(s.state)));
     }
     const std::string share = about.bit_rate ? fmt::format("{:.1f} %", load)
@@ -174,9 +176,9 @@ bool report(const DumpOptions& options, const Source& source, double seconds) {
     const std::string name = source.name.empty() ? "" : source.name + ": ";
     const std::string state =
         about.transport == "capture" ? "" : fmt::format(", bus {}", can::to_string(s.state));
-    write_all(STDERR_FILENO, fmt::format("{}{} in {:.2f} s, bus load {}, {} errors, {} lost{}\n",
-                                         name, counted(source.frames, "frame"), seconds, share,
-                                         s.errors, s.lost, state));
+    write_all(STDERR_FILENO,
+              fmt::format("{}{} in {:.2f} s, bus load {}, {} errors, {} lost{}\n", name,
+                          counted(frames, "frame"), seconds, share, s.errors, s.lost, state));
     return true;
 }
 
@@ -192,7 +194,9 @@ public:
         const double time = seconds_of(f, source);
         ++frames_;
         ++source.frames;
-        if (!f.error) {
+        if (f.error) {
+            ++source.error_frames;
+        } else {
             const can::Description& about = source.link->description();
             source.busy += can::duration_ns(can::frame_bits(f), about.bit_rate, about.data_rate);
         }

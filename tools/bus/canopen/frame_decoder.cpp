@@ -60,10 +60,16 @@ std::string block_segment(const Frame& f) {
                        (f.data[0] & 0x80) != 0 ? ", the last" : "");
 }
 
+bool is_data_of(const Frame& f, unsigned length) { return !f.remote && f.length == length; }
+
+/// States why a frame is not a data frame of `length` bytes.
+std::string wrong_form(const Frame& f, unsigned length) {
+    if (f.remote) return "remote request; expected: a data frame";
+    return fmt::format("wrong length; expected: {} byte{}", length, length == 1 ? "" : "s");
+}
+
 DecodedFrame nmt(const Frame& f) {
-    if (f.remote || f.length != 2) {
-        return {FrameKind::nmt, "NMT with a wrong length: it has 2 bytes"};
-    }
+    if (!is_data_of(f, 2)) return {FrameKind::nmt, "NMT: " + wrong_form(f, 2)};
     const char* const known = canopen::to_string(static_cast<canopen::NmtCommand>(f.data[0]));
     const std::string command = known ? known : fmt::format("unknown command 0x{:02X}", f.data[0]);
     const std::string who = f.data[1] == 0 ? "all nodes" : fmt::format("node {}", f.data[1]);
@@ -71,9 +77,8 @@ DecodedFrame nmt(const Frame& f) {
 }
 
 DecodedFrame emergency(unsigned node, const Frame& f) {
-    if (f.remote || f.length != 8) {
-        return {FrameKind::emergency,
-                fmt::format("EMCY of node {} with a wrong length: it has 8 bytes", node)};
+    if (!is_data_of(f, 8)) {
+        return {FrameKind::emergency, fmt::format("EMCY of node {}: {}", node, wrong_form(f, 8))};
     }
     const auto code = static_cast<std::uint16_t>(number(f, 0, 2));
     return {FrameKind::emergency,
@@ -82,9 +87,7 @@ DecodedFrame emergency(unsigned node, const Frame& f) {
 }
 
 DecodedFrame time_stamp(const Frame& f) {
-    if (f.remote || f.length != 6) {
-        return {FrameKind::time, "TIME with a wrong length: it has 6 bytes"};
-    }
+    if (!is_data_of(f, 6)) return {FrameKind::time, "TIME: " + wrong_form(f, 6)};
     const std::uint32_t ms = number(f, 0, 4) & 0x0fffffff;
     constexpr std::time_t from_1970_to_1984 = 5113;  // days
     const std::time_t seconds =
@@ -99,7 +102,7 @@ DecodedFrame heartbeat(unsigned node, const Frame& f) {
     }
     if (f.length != 1) {
         return {FrameKind::heartbeat,
-                fmt::format("heartbeat of node {} with a wrong length: it has 1 byte", node)};
+                fmt::format("heartbeat of node {}: {}", node, wrong_form(f, 1))};
     }
     if (f.data[0] == 0) {
         return {FrameKind::heartbeat, fmt::format("boot-up of node {}", node)};
@@ -145,9 +148,7 @@ constexpr LssCommand lss_commands[] = {
 
 DecodedFrame lss(bool master, const Frame& f) {
     const std::string who = master ? "LSS master: " : "LSS slave: ";
-    if (f.remote || f.length != 8) {
-        return {FrameKind::lss, who + "wrong length: it has 8 bytes"};
-    }
+    if (!is_data_of(f, 8)) return {FrameKind::lss, who + wrong_form(f, 8)};
     for (const LssCommand& c : lss_commands) {
         if (c.code != f.data[0]) continue;
         const bool valued = c.bytes > 0 && !(master && c.code >= 0x5a);
@@ -220,7 +221,7 @@ DecodedFrame sdo(const std::string& who, const Frame& f, Blocks& blocks, bool Bl
     const auto decoded = [&](const std::string& what) {
         return DecodedFrame{FrameKind::sdo, who + what};
     };
-    if (f.remote || f.length != 8) return decoded("wrong length: it has 8 bytes");
+    if (!is_data_of(f, 8)) return decoded(wrong_form(f, 8));
     if (blocks.*in_segments && f.data[0] != 0x80) {
         blocks.*in_segments = (f.data[0] & 0x80) == 0;
         return decoded(block_segment(f));
