@@ -679,6 +679,30 @@ TEST(LimitText, States_that_nothing_passes_where_0_means_that_there_is_no_limit)
     EXPECT_EQ(faults.text, "a limit is not a number and never was one; nothing passes");
 }
 
+TEST(LimitText, Of_a_bypass_knows_the_time_that_was_valid_before_the_bypass) {
+    Faults faults;
+    Instance lock("interlock", {{"inputs", "1"}}, {{"hal.faults/1", &faults.record}});
+    lock.set("start-needs-reset", false);
+    lock.set("in-00", true);
+    lock.set("bypass-mask", std::uint64_t{1});
+    lock.set("bypass-time", 0.1);
+    lock.run("");
+    lock.set("bypass-time", nan);
+    lock.run("");
+    EXPECT_EQ(faults.text, "a limit is not a number; its last valid value applies");
+    lock.set("bypass-enable", true);
+    lock.set("in-00", false);
+    for (int cycle = 0; cycle < 50; ++cycle) {
+        lock.run("");
+        ASSERT_TRUE(lock.get<bool>("ok")) << cycle;
+    }
+    for (int cycle = 0; cycle < 60; ++cycle) {
+        lock.run("");
+    }
+    EXPECT_FALSE(lock.get<bool>("ok"));
+    EXPECT_EQ(faults.raised, 1);
+}
+
 INSTANTIATE_TEST_SUITE_P(Every_limit, LimitPin, testing::ValuesIn(rows), [](const auto& row) {
     return std::regex_replace(row.param.component + "_" + row.param.limit,
                               std::regex("[^A-Za-z0-9]"), "_");
