@@ -113,6 +113,18 @@ bool reject_shared_time(Context& context) {
     return true;
 }
 
+/// Returns whether the amount of an `advance` has a unit, and only its number does not fit.
+bool is_too_large(const Context& context) {
+    const auto quantity = parse_quantity(context.argument(0));
+    if (!quantity || quantity->number < 1) return false;
+    if (context.count() == 2) {
+        const bool is_whole =
+            context.argument(0).find_first_not_of("0123456789") == std::string::npos;
+        return is_whole && context.argument(1).starts_with("cycle");
+    }
+    return !quantity->unit.empty() && parse_duration_ns("0" + std::string(quantity->unit));
+}
+
 }  // namespace
 
 void command_advance(Context& context) {
@@ -126,8 +138,9 @@ void command_advance(Context& context) {
     } else if (!whole_number(amount)) {
         if (const auto ns = parse_duration_ns(amount)) return advance_ns(context, *ns);
     }
+    const char* const problem = is_too_large(context) ? "' is too large" : "' has no valid unit";
     context.diagnostics.error(
-        "bad-duration", context.span(0), "'" + amount + "' has no valid unit", "",
+        "bad-duration", context.span(0), "'" + amount + problem, "",
         "write `advance 10 cycles`, or a time with its unit: `advance 250ms`");
 }
 

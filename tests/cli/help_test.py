@@ -144,6 +144,12 @@ class WrongWords(Case):
         self.assertIn("many", error)
         self.assertEqual(1, error.count("\n"))
 
+    def test_number_beyond_64_bits(self):
+        self.assertEqual(
+            "hal sim: --cycles: 18446744073709551616 is too large; use at most 18446744073709551615; see: hal help sim\n",
+            self.bad("sim", "x.hal", "--cycles", "18446744073709551616"),
+        )
+
     def test_missing_file_word(self):
         for command in ("sim", "check", "fmt", "graph"):
             error = self.bad(command)

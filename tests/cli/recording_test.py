@@ -51,6 +51,13 @@ class Simulated(Case):
         with open(self.folder / name, newline="") as file:
             return list(csv.reader(file))
 
+    def test_a_machine_without_values_cannot_be_recorded(self):
+        path = self.write("empty.hal", "# nothing\n")
+        self.assertEqual(
+            "hal sim: --record: the machine has no values to record\n",
+            self.bad("sim", "-q", path, "--for", "5ms", "--record", "run.csv"),
+        )
+
     def test_every_cycle_is_in_the_table(self):
         self.sim(NETLIST, "--for", "50ms", "--record", "run.csv", "--values", "sine,high")
         rows = self.rows()

@@ -91,6 +91,14 @@ class Sim(Case):
             r"(?m)^servo +1 ms +1234 +0 ",
         )
 
+    def test_an_advance_that_is_too_large_is_named(self):
+        path = self.write("a.hal", SERVO)
+        for amount in ("9223372036854775808ms", "99999999999999999999 cycles"):
+            self.assertIn(
+                f"'{amount.split()[0]}' is too large [bad-duration]",
+                self.run_program("sim", path, "-e", "advance " + amount).stderr,
+            )
+
     def test_for_and_cycles_exclude_each_other(self):
         self.assertIn(
             "exclude each other", self.bad("sim", "x.hal", "--for", "1s", "--cycles", "1")

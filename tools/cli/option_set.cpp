@@ -3,7 +3,9 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
+#include <cstdint>
 #include <cstdlib>
 #include <fmt/core.h>
 #include <type_traits>
@@ -49,6 +51,14 @@ void DeclaredOption::not_negative() {
                    : std::string();
     });
 }
+void DeclaredOption::fits_64_bits() {
+    option_->check([](const std::string& text) {
+        errno = 0;
+        std::strtoull(text.c_str(), nullptr, 0);
+        return errno == ERANGE ? fmt::format("{} is too large; use at most {}", text, UINT64_MAX)
+                               : std::string();
+    });
+}
 
 OptionSet::OptionSet(Options& options, const char* name, const char* summary)
     : options_(options), app_(std::make_unique<CLI::App>(summary, fmt::format("hal {}", name))) {
@@ -87,6 +97,9 @@ DeclaredOption OptionSet::value(const char* names, T& to, const char* type,
     }
     if (std::is_unsigned_v<T>) {
         option.not_negative();  // a negative number would wrap around
+    }
+    if (std::is_same_v<T, std::uint64_t>) {
+        option.fits_64_bits();  // a larger number would become the largest one
     }
     return option;
 }

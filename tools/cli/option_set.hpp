@@ -26,6 +26,7 @@ public:
     void in(double min, double max);
     void quietly_in(int min, int max);  ///< the help does not show it
     void not_negative();
+    void fits_64_bits();
     void finite();
 
 private:

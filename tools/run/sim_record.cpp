@@ -133,10 +133,11 @@ int record_advance(const SimOptions& options, HostedMachine& machine) {
             return fail(options, "--values: " + unknown);
         }
         step = step_of(shortest_period_ns(session), options);
-        probe = session.probes().attach({.names = chosen_values(session.model(), patterns),
-                                         .buffer_ns = step.buffered_ns,
-                                         .advice = fewer_values},
-                                        problem);
+        std::vector<std::string> names = chosen_values(session.model(), patterns);
+        if (names.empty()) return fail(options, "--record: the machine has no values to record");
+        probe = session.probes().attach(
+            {.names = std::move(names), .buffer_ns = step.buffered_ns, .advice = fewer_values},
+            problem);
         if (!probe) return fail(options, "--values: " + problem);
         layout = Probes::layout(*probe);
         journal = session.event_log().begin();

@@ -431,6 +431,7 @@ behaviour(
 )
 
 SATURATED = "a conversion keeps the sign of the value and its order"
+WRAPPED = "the result is the same on every processor"
 HELD = "an output must not become NaN"
 
 behaviour(
@@ -883,7 +884,7 @@ behaviour(
     "beyond the range of s32; a NaN",
     "wraps around, as documented; 0 for NaN",
     "-2147483648",
-    SATURATED,
+    WRAPPED,
     ("conv_float_s32", "wild"),
 )
 behaviour(
@@ -893,7 +894,7 @@ behaviour(
     "beyond the range of s32; a NaN",
     "wraps around, as documented; 0 for NaN",
     "-2147483648",
-    SATURATED,
+    WRAPPED,
     ("conv_float_s32", "wild"),
     lasts=True,
 )
@@ -904,7 +905,7 @@ behaviour(
     "beyond 2147483647; a NaN; negative",
     "wraps around, or with `clamp` is limited to the range",
     "0, or 2147483647 with `clamp`",
-    SATURATED,
+    WRAPPED,
     ("conv_float_u32", "wild"),
 )
 behaviour(
@@ -914,7 +915,7 @@ behaviour(
     "beyond 2147483647; a NaN; negative",
     "wraps around, or with `clamp` is limited to the range",
     "0, or 2147483647 with `clamp`",
-    SATURATED,
+    WRAPPED,
     ("conv_float_u32", "wild"),
     lasts=True,
 )
