@@ -87,9 +87,17 @@ void Script::end_text(std::uint32_t source, bool collecting_before, std::size_t 
     }
     const std::size_t errors = effects_.errors();
     if (separately() && errors > 0 && shell_.options.level != Level::nothing) {
-        output_.err(counted(errors, "error") +
-                    "; lines with an error changed nothing, all others took effect\n");
+        output_.err(counted(errors, "error") + "; " + kept_going_text(source) + "\n");
     }
+}
+
+/// After errors under -k: what took effect.
+std::string Script::kept_going_text(std::uint32_t source) const {
+    if (ignored_.contains(source)) return "nothing was changed";
+    if (!ignored_.empty()) {
+        return "lines with an error and ignored files changed nothing, all others took effect";
+    }
+    return "lines with an error changed nothing, all others took effect";
 }
 
 int Script::run(const std::vector<Command>& commands) {
@@ -131,6 +139,9 @@ int Script::run_two_pass(const std::vector<std::uint32_t>& texts, Pass pass) {
 
 void Script::run_commands(std::uint32_t source) {
     ParsedText parsed = texts_.parse(source);
+    if (parsed.is_ignored()) {
+        ignored_.insert(source);
+    }
     auto problem = parsed.problems.all().begin();
     const auto report_problems_before = [&](std::uint32_t offset) {
         for (; problem != parsed.problems.all().end() &&

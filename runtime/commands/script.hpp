@@ -12,6 +12,7 @@
 
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -57,6 +58,7 @@ public:
 
 private:
     void end_text(std::uint32_t source, bool collecting_before, std::size_t collected_before);
+    std::string kept_going_text(std::uint32_t source) const;
     void run_commands(std::uint32_t source);
     void run_row(const std::vector<Command>& commands, std::size_t from, std::size_t to);
     void run_line(const Command& command);
@@ -121,6 +123,7 @@ private:
     bool failed_ = false;
     bool stopped_ = false;
     bool ended_ = false;
+    std::set<std::uint32_t> ignored_;  ///< texts of which nothing was carried out
 };
 
 }  // namespace hal

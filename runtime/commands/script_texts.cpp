@@ -71,6 +71,12 @@ bool ScriptTexts::is_open(const std::string& canonical) const {
     return std::ranges::find(files_, canonical, &OpenFile::path) != files_.end();
 }
 
+bool ParsedText::is_ignored() const {
+    return std::ranges::any_of(problems.all(), [](const Diagnostic& problem) {
+        return problem.code == "binary-text" || problem.code == "too-many-words";
+    });
+}
+
 ParsedText ScriptTexts::parse(std::uint32_t source) {
     Session& session = state_.session;
     ParsedText parsed;

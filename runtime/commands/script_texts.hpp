@@ -19,6 +19,8 @@ namespace hal {
 struct ParsedText {
     std::vector<Command> commands;
     Diagnostics problems;  ///< of the text itself
+    /// Returns whether all of it was ignored, because it is not a netlist.
+    bool is_ignored() const;
 };
 
 /// A file that is being read.

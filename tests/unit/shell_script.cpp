@@ -65,6 +65,23 @@ TEST(Script, keep_going_makes_each_line_a_transaction_of_its_own) {
         << machine.err;
 }
 
+TEST(Script, keep_going_states_that_nothing_of_an_ignored_file_took_effect) {
+    ShellMachine machine({.keep_going = true});
+    const std::string binary = "newsig good bit\nsetp \x01 1\n";
+    EXPECT_EQ(machine.file(binary), 1);
+    EXPECT_TRUE(machine.err.ends_with("\n1 error; nothing was changed\n")) << machine.err;
+    const std::string path =
+        testing::TempDir() + "halcyon_binary" + std::to_string(getpid()) + ".hal";
+    std::ofstream(path) << binary;
+    EXPECT_EQ(machine.file("loadrt and2 names=a\nsource " + path + "\nsetp a.in0 1\n"), 1);
+    std::remove(path.c_str());
+    EXPECT_TRUE(machine.err.ends_with(
+        "\n1 error; lines with an error and ignored files changed nothing, all others took "
+        "effect\n"))
+        << machine.err;
+    EXPECT_EQ(machine.says("getp a.in0"), "TRUE\n");
+}
+
 TEST(Script, a_warning_does_not_stop_and_the_last_line_says_so) {
     ShellMachine machine;
     EXPECT_EQ(
