@@ -12,6 +12,8 @@
 
 #include <gtest/gtest.h>
 
+#include "machine/report/setup_guard.hpp"
+
 namespace hal::test {
 namespace {
 
@@ -148,15 +150,46 @@ TEST(A_helper_thread_that_exits, is_named) {
 #endif
     const Result result = run("real", "newthread t 1000000\nloadrt test-exits in=thread\n");
     EXPECT_TRUE(WIFEXITED(result.status) && WEXITSTATUS(result.status) == 1) << result.status;
-    EXPECT_EQ(result.said,
-              "hal: a thread named 'helper' called exit() while the machine runs; outputs were set to "
-              "their safe values; the process ends\n");
+    EXPECT_EQ(
+        result.said,
+        "hal: a thread named 'helper' called exit() while the machine runs; outputs were set to "
+        "their safe values; the process ends\n");
 }
 
 TEST(A_process_without_a_fault, ends_quietly) {
     const Result result = run("virtual", netlist("0"));
     EXPECT_TRUE(WIFEXITED(result.status) && WEXITSTATUS(result.status) == 0) << result.status;
     EXPECT_EQ(result.said, "");
+}
+
+TEST(An_end_that_takes_too_long, is_limited) {
+    int text[2];
+    ASSERT_EQ(pipe(text), 0);
+    const pid_t child = fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) {
+        dup2(text[1], STDERR_FILENO);
+        close(text[0]);
+        close(text[1]);
+        SetupGuard guard;
+        guard.end_within(100'000'000);
+        pause();
+        _exit(0);
+    }
+    close(text[1]);
+    std::string printed;
+    char part[256];
+    for (ssize_t size = 0; (size = read(text[0], part, sizeof part)) > 0;) {
+        printed.append(part, static_cast<std::size_t>(size));
+    }
+    close(text[0]);
+    int status = 0;
+    ASSERT_EQ(waitpid(child, &status, 0), child);
+    EXPECT_TRUE(WIFEXITED(status));
+    EXPECT_EQ(WEXITSTATUS(status), 1);
+    EXPECT_EQ(printed,
+              "hal: the machine has not ended for 1 s: a thread does not end, or gets no CPU time; "
+              "outputs set to their safe values; the process ends\n");
 }
 
 }  // namespace

@@ -282,8 +282,19 @@ void HostedMachine::advance(std::int64_t ns, std::uint64_t cycles) {
 }
 
 void HostedMachine::shut_down() {
-    const auto lock = session.lock();
-    session.shut_down();
+    constexpr std::int64_t max_end_ns = 15'000'000'000;
+    const bool is_virtual = observer_ == nullptr;
+    const bool is_limited = setup_guard_ && !is_virtual;
+    if (is_limited) {
+        setup_guard_->end_within(max_end_ns);
+    }
+    {
+        const auto lock = session.lock();
+        session.shut_down();
+    }
+    if (is_limited) {
+        setup_guard_->end_within(SetupGuard::no_limit);  // what follows may wait for a reader
+    }
 }
 
 bool HostedMachine::programs_have_ended() {

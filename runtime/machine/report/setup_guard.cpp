@@ -52,6 +52,26 @@ void print_announced(const SetupCallNow& call, std::int64_t expected_ns) noexcep
     print_text("\n");
 }
 
+/// Ends the process when the end of the machine takes longer than its limit: a thread of the machine
+/// or of the runtime may get no CPU time for as long as others use it. `since_ns`: when it was first
+/// seen in no call of a component; 0: not yet.
+void limit_end(const SetupGuard::Flags& flags, std::int64_t& since_ns) noexcept {
+    const std::int64_t limit = flags.limit_ns.load();
+    const std::int64_t now = monotonic_ns();
+    if (limit == SetupGuard::no_limit || since_ns == 0) {
+        since_ns = now;
+    }
+    if (limit == SetupGuard::no_limit) return;
+    if (now - since_ns <= limit) return;
+    make_all_safe();
+    print_text("hal: the machine has not ended for ");
+    print_seconds(limit);
+    print_text(
+        ": a thread does not end, or gets no CPU time; outputs set to their safe values; the "
+        "process ends\n");
+    end_process(1);
+}
+
 /// The guard's thread. Prints which component has not returned from a call of setup: after 2 s, or
 /// as much later as the call has announced, and once for each call. While the process ends it
 /// prints this again, and 13 s later it sets the outputs to their safe values and ends the process.
@@ -63,6 +83,7 @@ void watch(const SetupGuard::Flags& flags) noexcept {
     std::int64_t named_ns = 0;
     std::int64_t announced_ns = 0;
     std::int64_t ending_ns = 0;
+    std::int64_t outside_ns = 0;
     while (!flags.over.load()) {
         const timespec nap{0, ending_ns == 0 ? 100'000'000 : 20'000'000};
         nanosleep(&nap, nullptr);
@@ -71,7 +92,11 @@ void watch(const SetupGuard::Flags& flags) noexcept {
             named_ns = 0;
         }
         const std::int64_t since = call.since_ns.load(std::memory_order_acquire);
-        if (since == 0) continue;
+        if (since == 0) {
+            limit_end(flags, outside_ns);
+            continue;
+        }
+        outside_ns = 0;
         const std::int64_t waited = monotonic_ns() - std::max(ending_ns, since);
 
         const std::int64_t expected = call.expected_ns.load();
