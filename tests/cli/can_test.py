@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: MIT
 # packages: canopen
 """hal can and hal canopen: a bus by hand, between processes over udp: on this machine, and from captures."""
-
 import json
 import os
 import pty
