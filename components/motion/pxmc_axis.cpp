@@ -327,7 +327,11 @@ axis holds its current position.
 | 2, 3 | measured position below `min-position` or above `max-position` by more than `position-margin`, and moving outwards |
 | 4 | measured speed above `overspeed` * `max-speed` |
 | 5 | the feedback is NaN or infinite |
-| 6 | `max-speed` or `max-acceleration` is 0, a limit other than `max-output` is negative, `min-position` is above `max-position`, one of these is NaN, `speed-filter` is not 0 to 60 s, or the output is NaN because of a gain |
+| 6 | an invalid parameter, see below, or the output is NaN because of a gain |
+
+A parameter is invalid when `max-speed` or `max-acceleration` is 0, a limit other than `max-output` is
+negative, `min-position` is above `max-position`, one of these is NaN, or `speed-filter` is not 0 to
+60 s.
 
     loadrt pxmc_axis names=left-wheel
     addf left-wheel.do-control servo
