@@ -62,8 +62,8 @@ private:
     /// Receives the values that are due. Returns whether those of all topics are valid.
     bool receive(Partner& partner, bool runs, Writes& writes);
     bool is_online(const Partner& partner) const;
-    /// Returns the age of the oldest values of a partner, or of its last sign of life; infinite:
-    /// there is none.
+    /// Returns the age of the oldest values of a partner, or of its last sign of life; infinite
+    /// without one.
     double age_ms(const Partner& partner) const;
     void receive(const Partner& partner, Reception& reception, const Values& values,
                  Writes& writes);

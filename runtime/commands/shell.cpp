@@ -16,6 +16,7 @@
 #include "commands/script.hpp"
 #include "commands/shell_state.hpp"
 #include "commands/table.hpp"
+#include "hal/privilege.hpp"
 #include "machine/session.hpp"
 
 namespace hal {
@@ -153,7 +154,7 @@ void Shell::note_ini_beside(const std::string& netlist) {
     std::error_code ignored;
     if (std::filesystem::is_regular_file(resolve_path(ini, options.directory), ignored)) {
         const auto lock = state_->session.lock();
-        state_->session.ini.set_candidate(ini);
+        state_->session.ini.set_candidate(privilege::shell_word(ini));
     }
 }
 

@@ -27,8 +27,9 @@ struct ExecutionEntry {
         written,  ///< programs wrote pins: values
         start,  ///< functions were started
         stop,
-        opened,  ///< an instance depends on the outside: instance, component,
-        ///< resources, threads, helpers, links, streams
+        /// an instance depends on the outside: instance, component, resources, threads, helpers,
+        /// links, streams
+        opened,
         sampled,  ///< the values of these names are recorded from here on: names
         end,  ///< the machine ended in order
     };

@@ -47,7 +47,8 @@ public:
     /// Every "[SECTION]KEY" there is, for suggestions.
     std::vector<std::string> names() const;
     bool empty() const { return entries_.empty(); }
-    /// The file that stands beside the netlist, for the help when none was given; or "".
+    /// The file that stands beside the netlist, as one types it, for the help when none was given;
+    /// or "".
     const std::string& candidate() const { return candidate_; }
     void set_candidate(std::string path) { candidate_ = std::move(path); }
 

@@ -310,6 +310,16 @@ start
             (["show", "a.mcap"], "'show' is not a valid name of a journal"),
         ]:
             self.assertIn(problem, self.bad("shell", "journal", *words))
+        line = self.run_program("shell", "journal", "own.mcap")
+        self.assertIn(
+            "warning: this machine has no journal: it begins with the machine [ignored-option]",
+            line.stderr,
+        )
+        self.assertIn(
+            "= help: write the line into a netlist that hal run or hal linuxcnc is given, or type: "
+            "hal run --journal FILE.mcap\n",
+            line.stderr,
+        )
         self.end(machine)
 
 

@@ -56,4 +56,8 @@ if __name__ == "__main__":
     if not shutil.which("milltask") or SANITIZED:
         print("LinuxCNC is not installed: sudo apt-get install linuxcnc-uspace")
         sys.exit(77)
-    unittest.main(argv=sys.argv[:1] + sys.argv[2:])
+    ran = unittest.main(argv=sys.argv[:1] + sys.argv[2:], exit=False).result
+    if ran.skipped:
+        print(ran.skipped[0][1])
+        sys.exit(77)
+    sys.exit(not ran.wasSuccessful())

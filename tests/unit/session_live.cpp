@@ -230,6 +230,9 @@ TEST_F(Live, Random_edits_keep_a_running_machine_consistent) {
     EXPECT_LT(taken, edits);
     EXPECT_EQ(machine.get("w.torn"), "0");
     until("w.looks", machine.number("w.looks") + 3);
+    for (const FaultRecord& fault : machine.session.reports().faults()) {
+        ADD_FAILURE() << fault.code << ": " << fault.sentence;
+    }
     EXPECT_EQ(machine.session.reports().fault_count(), 0u);
 }
 

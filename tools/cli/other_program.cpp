@@ -4,6 +4,7 @@
 #include <cerrno>
 #include <csignal>
 #include <cstring>
+#include <fcntl.h>
 #include <filesystem>
 #include <fmt/core.h>
 #include <spawn.h>
@@ -79,20 +80,38 @@ int spawn_with_default_signals(pid_t& child, const std::string& program, char** 
     return error;
 }
 
-/// Starts a program as spawn_with_default_signals() does; it gets SIGTERM when this one has ended, also
-/// when it was killed. Returns its process, or -1 with errno.
-pid_t spawn_companion(const char* name, const std::string& program, char** argv) {
-    const pid_t parent = ::getpid();
-    const pid_t child = ::fork();
-    if (child != 0) return child;
+/// What the copy of this process does to become a companion. `failure`: the end of a pipe that gets
+/// errno when it cannot, and is closed otherwise. Other threads may have held locks when this process
+/// was copied, so nothing here allocates or prints.
+[[noreturn]] void become_companion(const char* program, char** argv, pid_t parent, int failure) {
     ::prctl(PR_SET_PDEATHSIG, SIGTERM);
     if (::getppid() != parent) ::_exit(1);  // it has ended before that
     sigset_t blocked;
     ::sigemptyset(&blocked);
     ::sigprocmask(SIG_SETMASK, &blocked, nullptr);
     std::signal(SIGINT, SIG_DFL);
-    ::execv(program.c_str(), argv);
-    ::_exit(report_missing(name, errno));
+    ::execv(program, argv);
+    const int error = errno;
+    const ssize_t written = ::write(failure, &error, sizeof error);
+    ::_exit(written < 0 ? 2 : 1);
+}
+
+/// Starts a program as spawn_with_default_signals() does; it gets SIGTERM when this one has ended, also
+/// when it was killed. Returns 0, or errno.
+int spawn_companion(pid_t& child, const std::string& program, char** argv) {
+    int ends[2];
+    if (::pipe2(ends, O_CLOEXEC) != 0) return errno;
+    const pid_t parent = ::getpid();
+    child = ::fork();
+    const int fork_error = errno;
+    if (child == 0) become_companion(program.c_str(), argv, parent, ends[1]);
+    ::close(ends[1]);
+    int error = child < 0 ? fork_error : 0;
+    if (child > 0 && ::read(ends[0], &error, sizeof error) == sizeof error) {
+        ::waitpid(child, nullptr, 0);
+    }
+    ::close(ends[0]);
+    return error;
 }
 
 }  // namespace
@@ -121,13 +140,9 @@ pid_t start_program(const char* name, std::vector<std::string> arguments, Lifeti
     }
     argv.push_back(nullptr);
     pid_t child = 0;
-    int error = 0;
-    if (lifetime == Lifetime::of_this) {
-        child = spawn_companion(name, program, argv.data());
-        error = child < 0 ? errno : 0;
-    } else {
-        error = spawn_with_default_signals(child, program, argv.data());
-    }
+    const int error = lifetime == Lifetime::of_this
+                          ? spawn_companion(child, program, argv.data())
+                          : spawn_with_default_signals(child, program, argv.data());
     if (error == 0) return child;
     report_missing(name, error);
     return -1;

@@ -70,7 +70,7 @@ int run_program(const std::vector<std::string>& words, std::string& output) {
     const pid_t child = ::fork();
     if (child == 0) {
         // a program that reads what it does not get as arguments, as addr2line does, must not wait
-        const int nothing = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
+        const int nothing = ::open("/dev/null", O_RDONLY);
         ::dup2(nothing, STDIN_FILENO);
         ::dup2(ends[1], STDOUT_FILENO);
         ::dup2(ends[1], STDERR_FILENO);

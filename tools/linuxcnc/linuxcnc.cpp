@@ -19,11 +19,11 @@ namespace {
 RunOptions journal_options(const LinuxcncOptions& options, const Configuration& configuration) {
     RunOptions journal;
     static_cast<NetlistOptions&>(journal) = options;
+    static_cast<JournalSettings&>(journal) = options;
     journal.words = {configuration.file};
     if (!options.journal.empty()) {
         journal.journal = absolute_path(options.journal);  // the machine runs in another folder
     }
-    journal.keep_ns = options.keep_ns;
     return journal;
 }
 
@@ -56,8 +56,8 @@ int run_locked(const LinuxcncOptions& options, const Configuration& configuratio
     export_configuration(configuration, options);
     adopt_orphans();
     add_journal_of_netlists(journaled);
-    if (journaled.keep_ns > 0 && journaled.journal.empty()) {
-        return fail(options, "--journal-keep needs --journal FILE");
+    if (const std::string problem = journaled.journal_problem(); !problem.empty()) {
+        return fail(options, problem);
     }
     const int status = run_with_journal(journaled, [&](RunJournal* journal) {
         return launch(options, configuration, lock, journal);

@@ -2,18 +2,16 @@
 // `hal linuxcnc`: runs a LinuxCNC configuration as LinuxCNC's launcher does.
 #pragma once
 
-#include <cstdint>
 #include <string>
 
+#include "run/journal_settings.hpp"
 #include "run/netlist_options.hpp"
 
 namespace hal::tools {
 
-struct LinuxcncOptions : NetlistOptions {
+struct LinuxcncOptions : NetlistOptions, JournalSettings {
     std::string planner, homing;  ///< in place of [TRAJ]TPMOD and [EMCMOT]HOMEMOD
     std::string halfiles;         ///< a folder for netlists, searched first
-    std::string journal;          ///< file
-    std::int64_t keep_ns = 0;     ///< of the journal; 0: all of it
     bool verbose = false;
     bool linuxcnc_modules = false;
 
@@ -27,13 +25,7 @@ struct LinuxcncOptions : NetlistOptions {
         set.flag("-l,--linuxcnc-modules", linuxcnc_modules,
                  "load LinuxCNC's modules in place of Halcyon's components, where it has them");
         set.value("-H,--halfiles", halfiles, "FOLDER", "search netlists in this folder first");
-        set.value("--journal", journal, "FILE",
-                  "write the inputs of every cycle and all edits to FILE.mcap, for hal replay "
-                  "--exact");
-        set.duration("--journal-keep", keep_ns,
-                     "with --journal: keep the last 10min, 90s …; FILE is written at the end, on a "
-                     "fault as FILE-fault-1, and by journal save",
-                     1);
+        declare_journal(set);
         set.flag("-k,--keep-going", keep_going,
                  "continue after an error in a netlist, command by command");
         set.flag("-v,--verbose", verbose, "print each step");

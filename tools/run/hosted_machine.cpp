@@ -283,8 +283,7 @@ void HostedMachine::advance(std::int64_t ns, std::uint64_t cycles) {
 
 void HostedMachine::shut_down() {
     constexpr std::int64_t max_end_ns = 15'000'000'000;
-    const bool is_virtual = observer_ == nullptr;
-    const bool is_limited = setup_guard_ && !is_virtual;
+    const bool is_limited = setup_guard_ && !session.options().virtual_clock;
     if (is_limited) {
         setup_guard_->end_within(max_end_ns);
     }

@@ -133,8 +133,8 @@ int run_machine(const RunOptions& options, RunJournal* journal) {
     if (!options.values.empty() && options.journal.empty()) {
         return fail(options, "--values needs --journal FILE; hal record records a running machine");
     }
-    if (options.keep_ns > 0 && options.journal.empty()) {
-        return fail(options, "--journal-keep needs --journal FILE");
+    if (const std::string problem = options.journal_problem(); !problem.empty()) {
+        return fail(options, problem);
     }
     if (options.interactive && options.for_ns >= 0) {
         return fail(options, "-I and --for exclude each other; leave one out");

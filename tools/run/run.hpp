@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "run/journal_settings.hpp"
 #include "run/netlist_options.hpp"
 
 namespace hal {
@@ -13,11 +14,9 @@ class ExecutionSink;
 
 namespace hal::tools {
 
-struct RunOptions : NetlistOptions {
+struct RunOptions : NetlistOptions, JournalSettings {
     std::int64_t for_ns = -1;  ///< -1: not given
     std::string watchdog;      ///< a device of the Linux watchdog API
-    std::string journal;       ///< file
-    std::int64_t keep_ns = 0;  ///< of the journal; 0: all of it
     std::vector<std::string> values;  ///< to be recorded with it: names and patterns
     std::string dds;  ///< arguments of the DDS participant: "interfaces=10.0.0.1 domain=3"
     bool interactive = false;
@@ -31,18 +30,13 @@ struct RunOptions : NetlistOptions {
         set.for_how_long(for_ns, "stop after 10s, 250ms, 2min …; default: run until Ctrl-C");
         set.value("-N,--name", name, "NAME",
                   "name of this instance, when several run on one machine (default: default)");
-        set.value("--group", group, "GROUP",
-                  "let the members of this group control the instance, and run programs by it, too");
+        set.value(
+            "--group", group, "GROUP",
+            "let the members of this group control the instance, and run programs by it, too");
         declare_netlists(set);
         set.value("--watchdog", watchdog, "DEVICE",
                   "write to this device (/dev/watchdog) while every thread makes progress");
-        set.value("--journal", journal, "FILE",
-                  "write the inputs of every cycle and all edits to FILE.mcap, for hal replay "
-                  "--exact");
-        set.duration("--journal-keep", keep_ns,
-                     "with --journal: keep the last 10min, 90s …; FILE is written at the end, on a "
-                     "fault as FILE-fault-1, and by journal save",
-                     1);
+        declare_journal(set);
         set.values("--values", values, "NAMES",
                    "with --journal: record these pins, parameters and signals in every cycle, too; "
                    "patterns; may be repeated");

@@ -13,8 +13,8 @@ namespace hal::bus {
 
 /// Passes the capabilities of the program's file on to a program that is started while this exists:
 /// the restart of a CAN controller, raw frames, locked memory, real-time priority (capabilities(7),
-/// "ambient set"). Those that this
-/// process does not have are left out. It calls the kernel directly, for the calling thread only.
+/// "ambient set"). Those that this process does not have are left out. It calls the kernel directly,
+/// for the calling thread only.
 ///
 /// The destructor lowers exactly what the constructor has raised, however far that came. Lowering
 /// needs no privilege. [setup]

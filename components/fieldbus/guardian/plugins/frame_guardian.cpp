@@ -149,10 +149,11 @@ private:
         constexpr std::int64_t max_ms = max_duration_ns / millisecond;
         if (duration_ms <= max_ms) return;
         throw hal::ArgumentError(
-            "repeat", "repeat=" + std::to_string(repeat_) + " every_ms=" +
-                          std::to_string(every_ms_) + " takes " + std::to_string(duration_ms) +
-                          " ms, and a stop takes at most 60000 ms; write repeat=" +
-                          std::to_string(max_ms / every_ms_) + ", or a shorter every_ms=");
+            "repeat",
+            "repeat=" + std::to_string(repeat_) + " every_ms=" + std::to_string(every_ms_) +
+                " takes " + std::to_string(duration_ms) + " ms, and a stop takes at most " +
+                std::to_string(max_ms) + " ms; write repeat=" + std::to_string(max_ms / every_ms_) +
+                ", or a shorter every_ms=");
     }
 
     bool is_in_memory() const {
