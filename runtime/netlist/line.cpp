@@ -91,6 +91,43 @@ LineReader::LineReader(const Sources& sources, std::uint32_t source)
     }
 }
 
+void LineReader::remove_carriage_return(std::string_view& row, std::size_t newline) {
+    if (!row.ends_with('\r')) return;
+    row.remove_suffix(1);
+    if (dos_ending_) return;
+    const auto end = static_cast<std::uint32_t>(newline);
+    dos_ending_ = Span{source_, end - 1, end};
+}
+
+static bool is_control(char c) {
+    return (static_cast<unsigned char>(c) < 0x20 && c != '\t') || c == 0x7F;
+}
+
+/// Tested without a branch per character: nearly all lines have none.
+static bool has_control(std::string_view row) {
+    bool found = false;
+    for (const char c : row) {
+        found |= is_control(c);
+    }
+    return found;
+}
+
+void LineReader::note_controls(std::string_view row, std::size_t offset) {
+    if (!has_control(row)) return;
+    for (std::size_t i = 0; i < row.size(); ++i) {
+        const char c = row[i];
+        if (c == '\0') {
+            control_ = offset + i;
+            return;
+        }
+        if (!is_control(c)) continue;
+        std::optional<std::size_t>& first = c == '\r' ? carriage_return_ : control_;
+        if (!first) {
+            first = offset + i;
+        }
+    }
+}
+
 bool LineReader::next(Line& line) {
     if (at_ >= text_.size()) return false;
     line.clear(source_);
@@ -101,35 +138,14 @@ bool LineReader::next(Line& line) {
         const std::size_t newline = std::min(text_.find('\n', at_), text_.size());
         std::string_view row = text_.substr(at_, newline - at_);
         const bool last = newline == text_.size();
-        if (!last && row.ends_with('\r')) {
-            row.remove_suffix(1);
-            if (!dos_ending_) {
-                dos_ending_ = Span{source_, static_cast<std::uint32_t>(newline - 1),
-                                   static_cast<std::uint32_t>(newline)};
-            }
+        if (!last) {
+            remove_carriage_return(row, newline);
         }
         const bool goes_on = row.ends_with('\\');
         if (goes_on) {
             row.remove_suffix(1);
         }
-
-        // Tested without a branch per character: nearly all lines have none.
-        bool odd = false;
-        for (const char c : row) {
-            odd |= (static_cast<unsigned char>(c) < 0x20 && c != '\t') || c == 0x7F;
-        }
-        for (std::size_t i = 0; odd && i < row.size(); ++i) {
-            if (row[i] == '\r' && !carriage_return_) {
-                carriage_return_ = joined + i;
-            }
-            const bool control = (static_cast<unsigned char>(row[i]) < 0x20 && !is_blank(row[i]) &&
-                                  row[i] != '\r') ||
-                                 row[i] == 0x7F;
-            if (control && (!control_ || row[i] == '\0')) {
-                control_ = joined + i;
-            }
-            if (row[i] == '\0') break;
-        }
+        note_controls(row, joined);
         line.append(row, static_cast<std::uint32_t>(at_));
         joined += row.size();
         at_ = newline + 1;

@@ -69,6 +69,11 @@ public:
     std::optional<Span> dos_ending() const { return dos_ending_; }
 
 private:
+    /// Removes the CR of a line end that is CR LF, and notes the first one.
+    void remove_carriage_return(std::string_view& row, std::size_t newline);
+    /// Notes control characters of a row that begins `offset` characters into the line.
+    void note_controls(std::string_view row, std::size_t offset);
+
     std::uint32_t source_;
     std::string_view text_;
     std::size_t at_ = 0;

@@ -463,30 +463,38 @@ private:
         return fits ? origin : origin_for(fastest->second);
     }
 
+    /// Decides what a recorded column is for: it drives a signal without a writer or an input
+    /// without a signal; what else the machine has under its name is compared.
     void use(const Model& model, const mcap::Table& table, std::size_t c,
              std::vector<std::vector<std::string>>& commands) {
         const mcap::Column& column = table.columns[c];
         if (!matches(options_.names, column.name)) return;
         const Pin* const pin = model.find_pin(column.name);
         const Signal* const signal = pin ? pin->signal : model.find_signal(column.name);
-        // times are never the same
-        if ((!pin && !signal) || (pin && (pin->of_thread || pin->function))) return;
-        const std::string source = fmt::format("{}.{}", players_.at(thread_of(table).name).name,
-                                               playback_pin(column.name));
-        const bool parameter = pin && pin->dir == HAL_DIR_PARAM;
+        if (!pin && !signal) return;
+        if (pin && is_time(*pin)) return;
+        const std::string& name = signal ? signal->name : pin->name;
         if (signal && !signal->writer && signal->ios == 0) {
-            if (driven_.insert(signal->name).second) {
-                commands.push_back({"net", signal->name, source});
-            }
+            if (!driven_.insert(name).second) return;
+            commands.push_back({"net", name, source_of(table, column)});
         } else if (!signal && pin->dir == HAL_DIR_IN) {
-            if (driven_.insert(pin->name).second) {
-                commands.push_back(
-                    {"net", fmt::format("{}:{}", player, pin->name), source, pin->name});
-            }
-        } else if (!parameter && !driven_.contains(signal ? signal->name : pin->name) &&
+            if (!driven_.insert(name).second) return;
+            commands.push_back(
+                {"net", fmt::format("{}:{}", player, name), source_of(table, column), name});
+        } else if (!is_parameter(pin) && !driven_.contains(name) &&
                    seen_.insert(column.name).second) {
             compared_.push_back({column.name, &table, c});
         }
+    }
+
+    /// Measured times are never the same.
+    static bool is_time(const Pin& pin) { return pin.of_thread || pin.function; }
+    static bool is_parameter(const Pin* pin) { return pin && pin->dir == HAL_DIR_PARAM; }
+
+    /// The pin of the player that gives a recorded column.
+    std::string source_of(const mcap::Table& table, const mcap::Column& column) const {
+        const std::string& name = players_.at(thread_of(table).name).name;
+        return fmt::format("{}.{}", name, playback_pin(column.name));
     }
 
     // Recorded times count from the first row, replayed ones from when it is due. A recorded row is

@@ -153,6 +153,43 @@ int execute_and_show(const SimOptions& options, HostedMachine& machine, TrackedO
     return status;
 }
 
+/// Prints what --report or the summary says of the run that ends.
+void report_run(const SimOptions& options, HostedMachine& machine, bool has_output,
+                std::chrono::steady_clock::duration wall) {
+    if (options.report) {
+        write_all(STDERR_FILENO, timing_report(machine.session));
+        return;
+    }
+    if (!summary_wanted(options, has_output || !options.show.empty())) return;
+    const auto simulated = simulated_for(machine.session.threads().now_ns(), wall);
+    write_all(STDERR_FILENO, simulated_summary(machine.session, simulated));
+}
+
+/// Loads, advances, executes and shows. With --keep-going what could be loaded runs, and the status
+/// has the rest.
+int run_machine(const SimOptions& options, const SimRecorder* recorder, HostedMachine& machine) {
+    TrackedOutput output;
+    const auto begun = std::chrono::steady_clock::now();
+    int status = machine.load(&output);
+    const bool keeps_going = options.keep_going && (status == 0 || !machine.stop.requested());
+    const bool loaded = status == 0 || keeps_going;
+    const auto goes_on = [&] { return status == 0 || keeps_going; };
+    if (goes_on() && is_advanced(options)) {
+        status = std::max(status, advance(options, recorder, machine));
+    }
+    const auto wall = std::chrono::steady_clock::now() - begun;
+    if (goes_on()) {
+        status = std::max(status, execute_and_show(options, machine, output));
+    }
+    if (goes_on()) {
+        machine.shell.warn_when_nothing_ran(output);
+    }
+    if (loaded || options.report) {
+        report_run(options, machine, output.printed, wall);
+    }
+    return machine.faulted() || machine.stop.requested() ? 1 : status;
+}
+
 }  // namespace
 
 /// Loads the netlists on the virtual clock, advances them, executes --execute and prints --show.
@@ -174,33 +211,7 @@ int simulate(const SimOptions& options, const SimRecorder* recorder) {
         options.name.empty() ? fmt::format("sim-{}", ::getpid()) : options.name;
     HostedMachine machine(options, name, true);
     if (!machine.serve(!options.name.empty())) return 1;
-    TrackedOutput output;
-    const auto begun = std::chrono::steady_clock::now();
-    int status = machine.load(&output);
-    // with -k what could be loaded runs, and the status has the rest
-    const bool loaded = status == 0 || (options.keep_going && !machine.stop.requested());
-    const auto goes_on = [&] { return status == 0 || (loaded && options.keep_going); };
-    if (goes_on() && is_advanced(options)) {
-        status = std::max(status, advance(options, recorder, machine));
-    }
-    const auto wall = std::chrono::steady_clock::now() - begun;
-    if (goes_on()) {
-        status = std::max(status, execute_and_show(options, machine, output));
-    }
-    if (goes_on()) {
-        machine.shell.warn_when_nothing_ran(output);
-    }
-    if (machine.faulted() || machine.stop.requested()) {
-        status = 1;
-    }
-    if (options.report) {
-        write_all(STDERR_FILENO, timing_report(machine.session));
-    } else if (loaded && summary_wanted(options, output.printed || !options.show.empty())) {
-        write_all(STDERR_FILENO,
-                  simulated_summary(machine.session,
-                                    simulated_for(machine.session.threads().now_ns(), wall)));
-    }
-    return status;
+    return run_machine(options, recorder, machine);
 }
 
 }  // namespace hal::tools

@@ -4,7 +4,7 @@
 #include "link/capture.hpp"
 
 #include <algorithm>
-#include <cstring>
+#include <optional>
 
 #include "capture/packets.hpp"
 
@@ -14,36 +14,64 @@ namespace {
 
 using namespace hal::replay;
 
+/// The part of a packet that is the CAN frame.
+struct CanPart {
+    std::string_view bytes;  // at least the 8 of the head
+    bool flexible = false;  // a frame of CAN FD
+};
+
+/// What is left behind the header of the interface, whose protocol says whether it is CAN FD.
+std::optional<CanPart> part_of_cooked(std::string_view packet) {
+    constexpr unsigned classic = 0x000c;
+    constexpr unsigned fd = 0x000d;
+    constexpr std::size_t header = 16;
+    if (packet.size() < header + 8) return std::nullopt;
+    const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(packet[i]); };
+    const unsigned protocol = byte(14) << 8U | byte(15);
+    if (protocol != classic && protocol != fd) return std::nullopt;
+    return CanPart{packet.substr(header), protocol == fd};
+}
+
+/// Without that header, the flags and the length say whether it is CAN FD.
+std::optional<CanPart> part_of_plain(std::string_view packet) {
+    if (packet.size() < 8) return std::nullopt;
+    const bool marked = (static_cast<unsigned char>(packet[5]) & 4) != 0;
+    const bool is_long = packet.size() > 16 || static_cast<unsigned char>(packet[4]) > 8;
+    return CanPart{packet, marked || is_long};
+}
+
+std::optional<CanPart> can_part(std::string_view packet, unsigned link) {
+    if (link == link_cooked) return part_of_cooked(packet);
+    if (link == link_can) return part_of_plain(packet);
+    return std::nullopt;
+}
+
+/// Copies the data of a frame with a valid length; a remote frame has none.
+bool copy_data(std::string_view bytes, Frame& f) {
+    if (f.length > 64) return false;
+    if (f.remote) return true;
+    if (bytes.size() < 8U + f.length) return false;
+    std::copy_n(bytes.begin() + 8, f.length, f.data.begin());
+    return true;
+}
+
 /// Parses one packet. Returns false when it is not a CAN frame.
 bool parse_packet(std::string_view packet, unsigned link, Frame& f) {
-    const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(packet[i]); };
     f = {};
-    bool flexible = false;
-    if (link == link_cooked) {
-        if (packet.size() < 24) return false;
-        const unsigned protocol = byte(14) << 8U | byte(15);
-        if (protocol != 0x000c && protocol != 0x000d) return false;
-        flexible = protocol == 0x000d;
-        packet.remove_prefix(16);
-    } else if (link != link_can || packet.size() < 8) {
-        return false;
-    } else {
-        flexible = packet.size() > 16 || (byte(5) & 4) != 0 || byte(4) > 8;
-    }
+    const std::optional<CanPart> part = can_part(packet, link);
+    if (!part) return false;
+    const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(part->bytes[i]); };
     const std::uint32_t id =
         std::uint32_t{byte(0)} << 24 | byte(1) << 16U | byte(2) << 8U | byte(3);
-    f.fd = flexible;
+    f.fd = part->flexible;
     f.error = (id & 0x20000000U) != 0;
     f.extended = !f.error && (id & 0x80000000U) != 0;
     f.remote = !f.error && (id & 0x40000000U) != 0;
     f.id = id & (f.extended || f.error ? 0x1fffffffU : 0x7ffU);
     f.length = byte(4);
-    f.bit_rate_switch = flexible && (byte(5) & 1) != 0;
-    f.error_state = flexible && (byte(5) & 2) != 0;
-    if (f.length > 64 || (!f.remote && packet.size() < 8U + f.length)) return false;
-    if (!f.remote && f.length != 0) {
-        std::memcpy(f.data.data(), packet.data() + 8, f.length);
-    }
+    f.bit_rate_switch = f.fd && (byte(5) & 1) != 0;
+    f.error_state = f.fd && (byte(5) & 2) != 0;
+    if (!copy_data(part->bytes, f)) return false;
     return f.error ? f.length <= 8 : f.valid();
 }
 

@@ -155,6 +155,44 @@ ControllerMonitor::ControllerMonitor(std::string name, Counting& counting, int i
     monitor_.emplace("can-monitor", 500, [this] { look(); });
 }
 
+void ControllerMonitor::publish_figures(const Interface& now) {
+    if (now.bit_rate != 0) {
+        counting_.bit_rate.store(now.bit_rate);
+    }
+    if (now.data_rate != 0) {
+        counting_.data_rate.store(now.data_rate);
+    }
+    if (now.has_counters) {
+        counting_.send_errors.store(now.send_errors);
+        counting_.receive_errors.store(now.receive_errors);
+    }
+}
+
+/// Error frames report the state of an interface whose driver does not tell it: such a one is
+/// active when it returns.
+State ControllerMonitor::publish_state(const Interface& now, State before) {
+    if (now.has_state) {
+        counting_.state.store(now.state);
+        return now.state;
+    }
+    if (before == State::down) {
+        counting_.state.compare_exchange_strong(before, State::active);
+    }
+    return counting_.state.load();
+}
+
+void ControllerMonitor::follow_bus_off(const Interface& now) {
+    const std::int64_t time_ns = link::monotonic_ns();
+    if (off_since_ns_ == 0) {
+        off_since_ns_ = time_ns;
+    }
+    const bool due = restart_ms_ != 0 && time_ns - off_since_ns_ >= restart_ms_ * 1'000'000LL;
+    const bool restarts = due || wants_restart.exchange(false);
+    if (restarts && restart_controller(now.index)) {
+        off_since_ns_ = 0;
+    }
+}
+
 /// Reads the state, the bit rates and the error counters of the interface from the kernel. An
 /// interface that was replaced is opened again. A controller that is off the bus is restarted when
 /// its time is over, or on request.
@@ -166,33 +204,14 @@ void ControllerMonitor::look() {
         if (!reopen_(now.index)) return;
         index_ = now.index;
     }
-    counting_.bit_rate.store(now.bit_rate != 0 ? now.bit_rate : counting_.bit_rate.load());
-    counting_.data_rate.store(now.data_rate != 0 ? now.data_rate : counting_.data_rate.load());
-    if (now.has_counters) {
-        counting_.send_errors.store(now.send_errors);
-
-        counting_.receive_errors.store(now.receive_errors);
-    }
-    State state = before;  // for an interface without a state, error frames report it
-    if (now.has_state) {
-        counting_.state.store(state = now.state);
-    } else if (before != State::down ||
-               !counting_.state.compare_exchange_strong(state, State::active)) {
-        state = counting_.state.load();
-    } else {
-        state = State::active;
-    }
+    publish_figures(now);
+    const State state = publish_state(now, before);
     if (before == State::down && state != State::down) {
         Counting::add(counting_.restarts);
     }
-
-    if (state != State::bus_off) return void(off_since_ns_ = 0);
-    if (off_since_ns_ == 0) {
-        off_since_ns_ = link::monotonic_ns();
-    }
-    const bool due =
-        restart_ms_ != 0 && link::monotonic_ns() - off_since_ns_ >= restart_ms_ * 1'000'000LL;
-    if ((due || wants_restart.exchange(false)) && restart_controller(now.index)) {
+    if (state == State::bus_off) {
+        follow_bus_off(now);
+    } else {
         off_since_ns_ = 0;
     }
 }

@@ -48,6 +48,10 @@ public:
 
 private:
     void look();
+    void publish_figures(const Interface& now);
+    State publish_state(const Interface& now, State before);
+    /// Restarts a controller that is off the bus when its time is over, or on request.
+    void follow_bus_off(const Interface& now);
     bool restart_controller(int index);
 
     const std::string name_;

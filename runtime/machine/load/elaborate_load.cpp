@@ -297,6 +297,44 @@ LoadedComponent* loaded_component(Elaboration& on, const Token& name) {
     return nullptr;
 }
 
+/// Returns where a component that names no origin comes from: one that is loaded keeps its own.
+Origin origin_of(const Elaboration& on, const Token& name, Origin written) {
+    if (written != Origin::any) return written;
+    const LoadedComponent* const loaded = on.model.find_component(name.text);
+    return loaded && !is_module(*loaded) ? written : usual_origin(name.text);
+}
+
+/// Returns why it is accepted that nothing is made of a component; none: it must be found.
+std::optional<Absences::Cause> accepted_absence(Elaboration& on, const Token& name, Origin origin,
+                                                bool known) {
+    Absences& absences = on.edit.absences();
+    std::optional<Absences::Cause> cause;
+    if (!known || origin == Origin::linuxcnc) {
+        cause = absences.assumed(name.text);
+    }
+    if (cause || !on.check_only || !is_unchecked(on, name, origin)) return cause;
+    absences.assume(name.text);
+    return absences.assumed(name.text);
+}
+
+/// Notes the names of a component of which nothing was made.
+void note_absence(Elaboration& on, const Token& name, const LoadRequest& request,
+                  std::optional<Absences::Cause> cause, bool known) {
+    Absences& absences = on.edit.absences();
+    const bool has_names = !request.names.empty();
+    if (!known && !cause) {
+        const auto scope = has_names ? Absences::Scope::names : Absences::Scope::component;
+        cause = absences.add("component " + hal::quoted(name.text), "which is missing", name.span,
+                             scope);
+    }
+    for (const std::string& instance : request.names) {
+        absences.note(instance, cause);
+    }
+    if (has_names) return;
+    absences.note(name.text, cause);
+    absences.note(dashed(name.text), cause);
+}
+
 }  // namespace
 
 /// `loadrt NAME ARGUMENT…`: makes the instances of a component, or threads. The names of a
@@ -305,42 +343,22 @@ LoadedComponent* loaded_component(Elaboration& on, const Token& name) {
 void edits::loadrt(Elaboration& on, Args args) {
     Origin origin = Origin::any;
     if (!take_origin(on, args, origin)) return;
-    if (const LoadedComponent* const loaded = on.model.find_component(args[0].text);
-        origin == Origin::any && (!loaded || is_module(*loaded))) {
-        origin = usual_origin(args[0].text);
-    }
+    const Token& name = args[0];
+    const Args arguments = args.subspan(1);
+    origin = origin_of(on, name, origin);
     std::string text;
-    for (const Token& token : args.subspan(1)) {
+    for (const Token& token : arguments) {
         append_item(text, written(token.text), " ");
     }
-    if (args[0].text == "threads" && origin != Origin::linuxcnc) {
-        return load_threads(on, args[0], args.subspan(1), text);
+    if (name.text == "threads" && origin != Origin::linuxcnc) {
+        return load_threads(on, name, arguments, text);
     }
     LoadRequest request;
-    const bool known =
-        on.model.find_component(args[0].text) || !on.plugins.find(args[0].text).empty();
-    Absences& absences = on.edit.absences();
-    std::optional<Absences::Cause> cause =
-        known && origin != Origin::linuxcnc ? std::nullopt : absences.assumed(args[0].text);
-    if (!cause && on.check_only && is_unchecked(on, args[0], origin)) {
-        absences.assume(args[0].text);
-        cause = absences.assumed(args[0].text);
-    }
-    if (read_request(on, args[0], origin, args.subspan(1), request) && !cause &&
-        make_instances(on, args[0], origin, request, text)) {
-        return;
-    }
-    if (!known && !cause) {
-        cause = absences.add(
-            "component " + hal::quoted(args[0].text), "which is missing", args[0].span,
-            request.names.empty() ? Absences::Scope::component : Absences::Scope::names);
-    }
-    for (const std::string& name : request.names) {
-        absences.note(name, cause);
-    }
-    if (!request.names.empty()) return;
-    absences.note(args[0].text, cause);
-    absences.note(dashed(args[0].text), cause);
+    const bool known = on.model.find_component(name.text) || !on.plugins.find(name.text).empty();
+    const auto cause = accepted_absence(on, name, origin, known);
+    const bool readable = read_request(on, name, origin, arguments, request);
+    if (readable && !cause && make_instances(on, name, origin, request, text)) return;
+    note_absence(on, name, request, cause, known);
 }
 
 /// `unloadrt NAME`: removes a component with its instances, one instance, or with `all` everything

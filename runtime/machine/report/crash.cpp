@@ -19,9 +19,9 @@
 #include "linuxcnc/find/modules.hpp"
 #include "machine/load/module_library.hpp"
 #include "machine/load/setup_call.hpp"
-#include "machine/report/process_calls.hpp"
 #include "machine/report/crash.hpp"
 #include "machine/report/exit_observer.hpp"
+#include "machine/report/process_calls.hpp"
 #include "model/model.hpp"
 
 extern "C" [[gnu::weak]] void __rtsan_realtime_enter();  // a program with the real-time guard
@@ -230,42 +230,65 @@ void continue_in_copy() noexcept {
 
 bool is_machine_process() noexcept { return machine_process.load() == getpid(); }
 
-// A machine ends by its own orders.
-bool report_end(const char* call, const char* code) noexcept {
-    if (!is_machine_process()) return false;
-    const Core* const core = Core::current();
-    const Core* const in_function = core && core->in_function() ? core : nullptr;
-    const char* const module = in_function ? nullptr : module_of_task();
-    const bool machine = has_machine();
-    if (!in_function && !module && !machine && !SetupCall::is_mine()) return false;
-    if (reported.exchange(true)) return false;
-    ExitObserver::silence();
-    make_all_safe();
-    print("hal: ");
-    name_caller(in_function, module);
-    if (__rtsan_realtime_enter && (in_function || module)) {
-        print(" made the call that the real-time guard prints above");
-        if (in_function) {
-            print(", at cycle ");
+namespace {
+
+/// Who made a call that ends the process, as far as it is known.
+struct EndCaller {
+    const Core* function = nullptr;  // whose thread executes a function of the machine
+    const char* module = nullptr;    // whose own task it is, outside a function
+    bool in_setup = SetupCall::is_mine();
+    bool has_machine = hal::has_machine();
+
+    static EndCaller now() noexcept {
+        EndCaller caller;
+        const Core* const core = Core::current();
+        if (core && core->in_function()) {
+            caller.function = core;
+        } else {
+            caller.module = module_of_task();
         }
+        return caller;
+    }
+    bool in_cycle() const noexcept { return function || module; }
+    bool is_known() const noexcept { return in_cycle() || has_machine || in_setup; }
+};
+
+/// Prints what was called, and when.
+void print_call(const EndCaller& caller, const char* call) noexcept {
+    const bool guarded = __rtsan_realtime_enter && caller.in_cycle();
+    if (guarded) {
+        print(" made the call that the real-time guard prints above");
     } else {
         print(" called ");
         print(call);
-        if (in_function) {
-            print(" at cycle ");
-        } else if (SetupCall::is_mine()) {
-            print(" in ");
-        } else if (!module) {
-            print(" while the machine runs");
-        }
     }
-    if (in_function) {
-        print(in_function->cycle_number());
-    } else if (!module && SetupCall::is_mine()) {
+    if (caller.function) {
+        print(guarded ? ", at cycle " : " at cycle ");
+        print(caller.function->cycle_number());
+    } else if (caller.module) {
+        return;
+    } else if (caller.in_setup) {
+        print(" in ");
         print(SetupCall::now.what);
+    } else {
+        print(" while the machine runs");
     }
-    print(machine ? "; outputs were set to their safe values; the process ends"
-                  : "; the process ends");
+}
+
+}  // namespace
+
+// A machine ends by its own orders.
+bool report_end(const char* call, const char* code) noexcept {
+    if (!is_machine_process()) return false;
+    const EndCaller caller = EndCaller::now();
+    if (!caller.is_known() || reported.exchange(true)) return false;
+    ExitObserver::silence();
+    make_all_safe();
+    print("hal: ");
+    name_caller(caller.function, caller.module);
+    print_call(caller, call);
+    print(caller.has_machine ? "; outputs were set to their safe values; the process ends"
+                             : "; the process ends");
     print(code);
     print("\n");
     return true;

@@ -3,6 +3,7 @@
 // it, and a device may never end: only regular files are read.
 #pragma once
 
+#include <algorithm>
 #include <cerrno>
 #include <cstddef>
 #include <cstring>
@@ -38,6 +39,35 @@ inline bool names_descriptor(std::string_view path) {
            path.starts_with("/proc/self/fd/");
 }
 
+/// Appends what an open file has, at most `max_bytes` in all. Returns the problem; empty: none.
+inline std::string append_file(int file, std::size_t max_bytes, std::string& bytes) {
+    char part[65536];
+    while (true) {
+        const ssize_t got = ::read(file, part, sizeof part);
+        if (got == 0) return {};
+        if (got < 0 && errno == EINTR) continue;
+        if (got < 0) return std::strerror(errno);
+        if (bytes.size() + static_cast<std::size_t>(got) > max_bytes) {
+            return "it is longer than " + std::to_string(max_bytes) + " bytes";
+        }
+        bytes.append(part, static_cast<std::size_t>(got));
+    }
+}
+
+/// Opens a file; with `any_kind` a pipe as well. Returns the descriptor, or -1 with the problem.
+inline int open_for_reading(const std::string& path, bool any_kind, struct stat& about,
+                            std::string& problem) {
+    const int mode = any_kind ? 0 : O_NONBLOCK;
+    const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOCTTY | mode);
+    if (file < 0 || ::fstat(file, &about) != 0) {
+        problem =
+            errno == ENXIO ? "it is a socket or a device without a driver" : std::strerror(errno);
+    } else if (!any_kind || S_ISDIR(about.st_mode)) {
+        problem = special_kind(about.st_mode);
+    }
+    return file;
+}
+
 /// Reads a whole regular file of at most `max_bytes` bytes. False: `bytes` is the reason. With
 /// `descriptors`, a file that was opened for this process (/dev/fd/N) may be a pipe, too. [setup]
 inline bool read_regular_file(const std::string& path, std::size_t max_bytes, std::string& bytes,
@@ -46,34 +76,14 @@ inline bool read_regular_file(const std::string& path, std::size_t max_bytes, st
         static_cast<std::string*>(taken)->assign(text, size);
     };
     if (hal_editor_text != nullptr && hal_editor_text(path.c_str(), take, &bytes)) return true;
-    const bool any = descriptors && names_descriptor(path);
-    const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOCTTY | (any ? 0 : O_NONBLOCK));
+    bytes.clear();
     struct stat about{};
     std::string problem;
-    bytes.clear();
-    if (file < 0 || ::fstat(file, &about) != 0) {
-        problem =
-            errno == ENXIO ? "it is a socket or a device without a driver" : std::strerror(errno);
-    } else if (!any || S_ISDIR(about.st_mode)) {
-        problem = special_kind(about.st_mode);
-    }
-    if (problem.empty() && S_ISREG(about.st_mode) && about.st_size > 0) {
-        bytes.reserve(static_cast<std::size_t>(about.st_size) < max_bytes
-                          ? static_cast<std::size_t>(about.st_size) + 1
-                          : max_bytes);
-    }
-    char part[65536];
-    while (problem.empty()) {
-        const ssize_t got = ::read(file, part, sizeof part);
-        if (got == 0) break;
-        if (got < 0 && errno == EINTR) continue;
-        if (got < 0) {
-            problem = std::strerror(errno);
-        } else if (bytes.size() + static_cast<std::size_t>(got) > max_bytes) {
-            problem = "it is longer than " + std::to_string(max_bytes) + " bytes";
-        } else {
-            bytes.append(part, static_cast<std::size_t>(got));
-        }
+    const int file = open_for_reading(path, descriptors && names_descriptor(path), about, problem);
+    if (problem.empty()) {
+        const auto size = static_cast<std::size_t>(S_ISREG(about.st_mode) ? about.st_size : 0);
+        bytes.reserve(std::min(size, max_bytes));
+        problem = append_file(file, max_bytes, bytes);
     }
     if (file >= 0) {
         ::close(file);

@@ -141,14 +141,22 @@ void Io::sample_digital(Time now) noexcept {
 
 /// Limits that are met send every change that no delta holds back; a delta alone needs no limit.
 bool Io::interrupts(unsigned n, std::int32_t value) const noexcept {
-    const auto by = triggers_[n];
+    constexpr unsigned upper = 1, lower = 2, delta = 4, negative_delta = 8, positive_delta = 16;
+    constexpr unsigned limits = upper | lower;
+    constexpr unsigned deltas = delta | negative_delta | positive_delta;
+    const unsigned selected = triggers_[n];
     const auto change = std::int64_t{value} - sent_[n];
-    const bool limit =
-        ((by & 1) != 0 && value >= upper_[n]) || ((by & 2) != 0 && value < lower_[n]);
-    const bool delta = ((by & 4) != 0 && std::abs(change) > std::int64_t{delta_[n]}) ||
-                       ((by & 8) != 0 && -change > std::int64_t{negative_delta_[n]}) ||
-                       ((by & 16) != 0 && change > std::int64_t{positive_delta_[n]});
-    return change != 0 && ((by & 3) == 0 || limit) && ((by & 28) == 0 || delta) && by != 0;
+    if (change == 0 || selected == 0) return false;
+    unsigned met = 0;
+    met |= value >= upper_[n] ? upper : 0;
+    met |= value < lower_[n] ? lower : 0;
+    met |= std::abs(change) > std::int64_t{delta_[n]} ? delta : 0;
+    met |= -change > std::int64_t{negative_delta_[n]} ? negative_delta : 0;
+    met |= change > std::int64_t{positive_delta_[n]} ? positive_delta : 0;
+    met &= selected;
+    const bool by_limit = (selected & limits) == 0 || (met & limits) != 0;
+    const bool by_delta = (selected & deltas) == 0 || (met & deltas) != 0;
+    return by_limit && by_delta;
 }
 
 void Io::sample_analog() noexcept {
