@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 """Prints how densely the C++ sources are written, and the worst places. It measures; it never fails.
 
-usage: density.py ROOT [BUILD] [--worst N] [--folders FOLDER...]
+usage: density.py ROOT [BUILD] [--worst N] [--folders FOLDER...] [--layout BRACES]
 
   branches/100  branches (cyclomatic complexity - 1) per 100 lines of function bodies; needs lizard
   tokens/line   words, numbers and operators per line that is neither empty nor a comment
@@ -11,10 +11,16 @@ usage: density.py ROOT [BUILD] [--worst N] [--folders FOLDER...]
   comma         statements that join assignments by a comma, and `return a = b, c;`
   wide          lines of more than 100 columns
   split         classes whose member functions are defined in more than one .cpp
+
+A figure per line depends on where lines are broken. --layout measures the text as clang-format lays
+it out with each statement on a line of its own and the braces of a style (Attach, Linux, Allman ...),
+so that trees of different layouts can be compared.
 """
+
 import argparse
 import collections
 import re
+import subprocess
 import sys
 from pathlib import Path
 
@@ -66,10 +72,22 @@ def has_nested_conditional(statement):
     return False
 
 
+def laid_out(text, name, braces):
+    """The text with each statement on a line of its own, and with braces placed as in a style."""
+    style = (
+        "{BasedOnStyle: Google, IndentWidth: 4, ColumnLimit: 100, SortIncludes: Never, "
+        f"BreakBeforeBraces: {braces}, AllowShortIfStatementsOnASingleLine: Never, "
+        "AllowShortLoopsOnASingleLine: false, AllowShortCaseLabelsOnASingleLine: false}"
+    )
+    command = ["clang-format-19", f"--style={style}", f"--assume-filename={name}"]
+    return subprocess.run(command, input=text, capture_output=True, text=True, check=True).stdout
+
+
 class Measures:
     """Totals of a tree, and its worst places."""
 
-    def __init__(self):
+    def __init__(self, braces=None):
+        self.braces = braces
         self.files = self.code = self.tokens = 0
         self.two = self.nested = self.comma = self.wide = 0
         self.branches = self.function_lines = 0
@@ -78,6 +96,8 @@ class Measures:
 
     def add(self, path, name, lizard):
         text = path.read_text(encoding="utf-8", errors="replace")
+        if self.braces:
+            text = laid_out(text, name, self.braces)
         stripped = plain(text)
         self.files += 1
         self.nested += sum(map(has_nested_conditional, re.split("[;{}]", stripped)))
@@ -140,9 +160,10 @@ def main():
     parser.add_argument("build", nargs="?")
     parser.add_argument("--worst", type=int, default=10)
     parser.add_argument("--folders", nargs="+", default=FOLDERS)
+    parser.add_argument("--layout", metavar="BRACES")
     options = parser.parse_args()
     lizard = optional_lizard()
-    measures = Measures()
+    measures = Measures(options.layout)
     for folder in options.folders:
         for path in sorted((options.root / folder).rglob("*")):
             if path.suffix in SOURCES and path.is_file():
