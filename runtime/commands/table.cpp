@@ -293,6 +293,11 @@ bool Context::is_absent(std::string_view name, Absences::Kind kind) const {
 
 std::span<const CommandRow> command_table() { return rows; }
 
+bool CommandRow::only_reads() const {
+    if (function.act == command_source) return false;
+    return is_query() || is_apart();
+}
+
 const CommandRow* find_command(std::string_view name) {
     static const auto index = [] {
         std::unordered_map<std::string_view, const CommandRow*> all;

@@ -120,6 +120,8 @@ struct CommandRow {
     bool is_apart() const {
         return behaviour.effect == Effect::nothing || behaviour.effect == Effect::output;
     }
+    /// Neither acts on the machine nor executes other commands, as `source` does.
+    bool only_reads() const;
     /// Called under `hal check`, too: see Context::checking().
     bool is_checked() const {
         return behaviour.effect != Effect::output && behaviour.timing != Timing::at_request;

@@ -510,7 +510,10 @@ start
         machine = self.run_journaled(MACHINE)
         self.wait_for_cycles(200)
         self.finish(machine)
+        other = self.folder / "other.hal"
+        other.write_text("setp pid.x.Pgain 3\nunloadrt all\n")
         lines = ["setp pid.x.Pgain 3", "sets sum 3", "pid.x.Pgain = 3", "loadrt sum2", "stop"]
+        lines.append(f"source {other}")
         out, _ = self.shell_in_the_past(["goto 100", *lines, "getp pid.x.Pgain"], status=1)
         for line, text in zip(lines, out[1:]):
             self.assertRegex(

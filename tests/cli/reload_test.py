@@ -33,6 +33,20 @@ struct Part : hal::Component {
 HAL_COMPONENT(Part, "part", "A part")
 """
 
+# What it reads stands beside the netlist.
+READER = """#include "hal/texts.hpp"
+struct Part : hal::Component {
+    using Component::Component;
+    hal::TextArgument file{*this, "file", "", "a number"};
+    hal::Texts texts{*this};
+    hal::Out<std::int32_t> number{*this, "number", "in the file"};
+    hal::Function run{*this, "", &Part::update, "one step"};
+    std::int32_t read_ = std::stoi(texts.read("file", file.get()));
+    void update(hal::Cycle) noexcept { number = read_; }
+};
+HAL_COMPONENT(Part, "part", "Reads a file")
+"""
+
 # Something only one instance can have: a file.
 OWNER = """#include <fcntl.h>
 #include <unistd.h>
@@ -210,6 +224,7 @@ class Reload(Case):
             .replace("GONE", ""),
             "owner1": OWNER.replace("VERSION", "1").replace("FAILS", "false"),
             "owner2": OWNER.replace("VERSION", "2").replace("FAILS", "false"),
+            "reader": READER,
             "failing": OWNER.replace("VERSION", "3").replace("FAILS", "true"),
         }
         cls.versions = {name: compiled(cls.built, name, text) for name, text in texts.items()}
@@ -340,6 +355,21 @@ class Reload(Case):
         )
         self.assertTrue(owned.exists())
         wait_until(lambda: self.value("p.version") == "2", "the second runs again")
+
+    def test_a_file_beside_the_netlist_is_found_again_from_another_folder(self):
+        (self.folder / "machine").mkdir()
+        number = self.write("machine/number.txt", "5")
+        self.install("reader")
+        netlist = self.write(
+            "machine/m.hal",
+            "loadrt threads name1=servo period1=1000000\nloadrt part names=p file=number.txt\n"
+            "addf p servo\nstart\n",
+        )
+        self.start("run", netlist)
+        wait_until(lambda: self.value("p.number") == "5", "the first number")
+        Path(number).write_text("6")
+        self.say("reload", "part")
+        wait_until(lambda: self.value("p.number") == "6", "the number of the reloaded component")
 
     def test_names_that_are_not_components(self):
         self.machine()

@@ -265,6 +265,7 @@ class ReplayPanel(Case):
             ["loadrt", "sum2"],
             ["advance", "3"],
             ["unload", "smooth"],
+            ["source", "other.hal"],
         ):
             status, text = self.client.run(*words)
             self.assertEqual(1, status, text)

@@ -98,7 +98,7 @@ std::string announcement(const PanelOptions& options, const Access& access,
     }
     text += fmt::format("programs and Foxglove: ws://{}:{}/?t={}\n", host, port, access.token);
     if (!options.write) {
-        text += "read-only; with --write, values can be set\n";
+        text += "read-only; hal panel --write can set values of a running machine\n";
     }
     return text;
 }

@@ -269,7 +269,7 @@ void ReplayServer::handle_run(ReplayClient& client, const Json& request, Work wo
     if (is_move(words[0])) return move(words, std::move(work));
     const CommandRow* const row = find_command(words[0]);
     if (!row) return reply_command(work, false, fmt::format("unknown command '{}'\n", words[0]));
-    if (!row->is_query() && !row->is_apart()) {
+    if (!row->only_reads()) {
         const bool has_edit = words[0] == "setp" || words[0] == "sets";
         return reply_command(work, false,
                              not_possible(words[0], has_edit ? joined(words) : "") + "\n");

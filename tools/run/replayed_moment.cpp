@@ -587,7 +587,7 @@ int ReplayedMoment::execute(const std::string& line) {
         print(fmt::format("unknown command '{}'; type help\n", name));
         return 1;
     }
-    if (!row->is_query() && !row->is_apart()) {
+    if (!row->only_reads()) {
         const bool can_be_tried = name == "setp" || name == "sets";
         print(fmt::format(
             "'{}' is not possible: this is a moment of the past. To execute the "

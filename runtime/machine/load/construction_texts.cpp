@@ -12,8 +12,9 @@ namespace {
 const char* find_text(const hal_host* host, const char* file) {
     Construction& c = construction_of(host);
     return guarded(c, file, [&] {
-        const std::string& netlist =
-            c.request.at.known() ? c.sources->get(c.request.at.source).name : "";
+        // of the line that loaded the instance: a reload may be typed in another folder
+        const Span& at = c.instance.loaded;
+        const std::string& netlist = at.known() ? c.sources->get(at.source).name : "";
         const auto slash = netlist.rfind('/');
         if (*file == '/' || slash == std::string::npos) return file;
         std::error_code none;
