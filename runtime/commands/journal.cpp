@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // journal: `journal FILE` in a netlist, and what a journaled machine has recorded so far as a file.
+#include <optional>
 #include <string>
 
 #include "commands/table.hpp"
@@ -42,7 +43,16 @@ void command_journal(Context& context) {
                                   "journal save needs a file", "", context.usage());
         return;
     }
-    if (!parse_journal_line(context.command, context.diagnostics)) return;
+    const std::optional<JournalLine> line =
+        parse_journal_line(context.command, context.diagnostics);
+    if (!line) return;
+    if (!context.shell.note_journal(line->file)) {
+        context.diagnostics.warning("ignored-option", context.command.span,
+                                    "a machine has one journal, and an earlier line names another "
+                                    "file: this line is ignored",
+                                    "", "remove one of the two lines");
+        return;
+    }
     const SessionOptions& options = context.session.options();
     if (context.checking() || options.sink || options.virtual_clock) return;
     context.diagnostics.warning(

@@ -45,7 +45,9 @@ Shell::Shell(Session& session, ShellOptions o)
 
 Shell::Shell(Shell& sibling, ShellOptions o)
     : options(std::move(o)),
-      state_(new State{.session = sibling.session(), .latencies = sibling.state_->latencies}) {}
+      state_(new State{.session = sibling.session(),
+                       .latencies = sibling.state_->latencies,
+                       .journal = sibling.state_->journal}) {}
 
 Shell::~Shell() {
     if (state_->collected.empty()) return;
@@ -65,6 +67,13 @@ void Shell::cancel(bool on) { state_->cancelled.store(on, std::memory_order_rela
 
 void Shell::look_up(std::function<std::optional<std::string>(const std::string&)> variable) {
     state_->variable = std::move(variable);
+}
+
+bool Shell::note_journal(const std::string& file) {
+    if (state_->journal->empty()) {
+        *state_->journal = file;
+    }
+    return *state_->journal == file;
 }
 
 void Shell::add_latencies(std::vector<std::string> lines) {

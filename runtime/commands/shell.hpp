@@ -161,6 +161,8 @@ public:
     /// of the socket brings its own.
     void look_in(std::optional<Ini> ini);
 
+    /// Notes the file of a line `journal`. Returns false when an earlier line names another one.
+    bool note_journal(const std::string& file);
     /// Sets the lines that latencies() of this shell and its siblings adds: about signals between
     /// the machines of a cell.
     void add_latencies(std::vector<std::string> lines);

@@ -28,6 +28,9 @@ struct Shell::State {
     /// and read with its lock held.
     std::shared_ptr<std::vector<std::string>> latencies =
         std::make_shared<std::vector<std::string>>();
+    /// The file that the first line `journal` of the netlists names, shared by all shells of the
+    /// session as well.
+    std::shared_ptr<std::string> journal = std::make_shared<std::string>();
     ScriptRunner run_script = {};
     LinuxcncCheck linuxcnc_check = {};  ///< `hal check --linuxcnc`
     /// With TWOPASS, while the loads are gathered: one `loadrt` for each LinuxCNC module, which is

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <fmt/core.h>
 #include <map>
+#include <unistd.h>
 #include <utility>
 
 #include "journal/journal_format.hpp"
@@ -17,7 +18,11 @@ namespace {
 
 class JoinedJournal {
 public:
-    explicit JoinedJournal(const std::string& to) : writer_(to) {}
+    explicit JoinedJournal(const std::string& to)
+        : writer_(to), is_open_(writer_.problem().empty() && writer_.error() == 0) {}
+
+    /// Whether there is a file of this object: it is not another recorder's.
+    bool is_open() const { return is_open_; }
 
     /// Returns why the file cannot be added, or "".
     std::string add(const std::string& path) {
@@ -67,6 +72,7 @@ private:
     }
 
     mcap::Writer writer_;
+    const bool is_open_;
     bool is_first_ = true;
     std::map<std::string, std::uint16_t> channels_;  // by topic
 };
@@ -89,10 +95,18 @@ std::string join_journals(const std::vector<std::string>& paths, const std::stri
         first = begins_with_state(paths[i]) ? i : first;
     }
     JoinedJournal joined(to);
-    for (std::size_t i = first; i < paths.size(); ++i) {
-        if (std::string problem = joined.add(paths[i]); !problem.empty()) return problem;
+    std::string problem;
+    for (std::size_t i = first; i < paths.size() && problem.empty(); ++i) {
+        problem = joined.add(paths[i]);
     }
-    return joined.close();
+    const std::string end_problem = joined.close();
+    if (problem.empty()) {
+        problem = end_problem;
+    }
+    if (!problem.empty() && joined.is_open()) {
+        ::unlink(to.c_str());
+    }
+    return problem;
 }
 
 }  // namespace hal

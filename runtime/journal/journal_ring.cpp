@@ -12,6 +12,7 @@
 #include <fstream>
 #include <sched.h>
 #include <spawn.h>
+#include <sys/file.h>
 #include <sys/wait.h>
 #include <system_error>
 #include <unistd.h>
@@ -66,6 +67,24 @@ std::string free_name(Name name) {
     }
 }
 
+/// Returns a descriptor of a folder that this process has locked; -1 with errno, EWOULDBLOCK when
+/// another process has it. A file system may have no locks.
+int locked_folder(const std::string& folder) {
+    const int file = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (file < 0 || ::flock(file, LOCK_EX | LOCK_NB) == 0) return file;
+    const int error = errno;
+    ::close(file);
+    errno = error;
+    return -1;
+}
+
+std::string is_used(const std::string& path, const std::string& folder) {
+    return fmt::format(
+        "cannot write '{}': another machine keeps its journal in '{}'; end that machine, or name "
+        "another file",
+        path, folder);
+}
+
 /// Starts a program that has the CPUs only when nothing else wants them. Returns its process, 0 if
 /// it cannot be started.
 pid_t start_idle(const std::vector<std::string>& words, const std::string& log) {
@@ -111,21 +130,50 @@ JournalRing::JournalRing(std::string path, std::int64_t keep_ns)
       part_ns_(std::max(keep_ns / parts_per_keep, min_part_ns)) {
     std::error_code error;
     if (fs::exists(folder_, error)) {
-        kept_ = free_name([this](int number) { return fmt::format("{}.{}", folder_, number); });
-        fs::rename(folder_, kept_, error);
-        if (error) {
-            problem_ =
-                fmt::format("cannot rename '{}' to '{}': {}", folder_, kept_, error.message());
-            return;
-        }
+        keep_folder();
     }
-    fs::create_directory(folder_, error);
-    if (error) {
-        problem_ = fmt::format("cannot create '{}': {}", folder_, error.message());
+    if (problem_.empty()) {
+        take_folder();
     }
 }
 
-JournalRing::~JournalRing() { end(); }
+void JournalRing::keep_folder() {
+    const int lock = locked_folder(folder_);
+    if (lock < 0 && errno == EWOULDBLOCK) {
+        problem_ = is_used(path_, folder_);
+        return;
+    }
+    kept_ = free_name([this](int number) { return fmt::format("{}.{}", folder_, number); });
+    std::error_code error;
+    fs::rename(folder_, kept_, error);
+    if (error) {
+        problem_ = fmt::format("cannot rename '{}' to '{}': {}", folder_, kept_, error.message());
+    }
+    if (lock >= 0) {
+        ::close(lock);
+    }
+}
+
+void JournalRing::take_folder() {
+    std::error_code error;
+    const bool is_new = fs::create_directory(folder_, error);
+    if (error) {
+        problem_ = fmt::format("cannot create '{}': {}", folder_, error.message());
+        return;
+    }
+    lock_ = is_new ? locked_folder(folder_) : -1;
+    const bool is_others = !is_new || (lock_ < 0 && errno == EWOULDBLOCK);
+    if (is_others) {
+        problem_ = is_used(path_, folder_);
+    }
+}
+
+JournalRing::~JournalRing() {
+    end();
+    if (lock_ >= 0) {
+        ::close(lock_);
+    }
+}
 
 std::string JournalRing::path_of(std::uint32_t number) const {
     return fmt::format("{}/{:06}.mcap", folder_, number);
@@ -136,8 +184,12 @@ std::vector<std::string> JournalRing::paths(bool with_current) const {
     for (const Part& part : parts_) {
         all.push_back(path_of(part.number));
     }
-    if (with_current) {
-        all.push_back(path_of(current_) + ".part");
+    if (!with_current) return all;
+    // none when the newest file could not be created, as on a full disk
+    const std::string current = path_of(current_) + ".part";
+    std::error_code ignored;
+    if (fs::exists(current, ignored)) {
+        all.push_back(current);
     }
     return all;
 }
@@ -202,8 +254,10 @@ void JournalRing::look_at_cut() {
     parts_.erase(parts_.begin());
 }
 
+/// A journal that could not be written has reported this itself.
 void JournalRing::fail(const std::string& why) {
     keeps_all_ = true;
+    if (!journal_->problem().empty()) return;
     machine_.note("the journal cannot begin later than the machine and is kept whole: " + why);
 }
 

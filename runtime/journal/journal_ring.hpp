@@ -39,7 +39,7 @@ public:
     /// Creates the folder of the ring of the file `path`, empty; see problem(). `keep_ns`: at least
     /// this much is kept. [setup]
     JournalRing(std::string path, std::int64_t keep_ns);
-    ~JournalRing();  ///< end()
+    ~JournalRing();  ///< end(), and gives the folder back
     JournalRing(const JournalRing&) = delete;
 
     /// Returns why there is no folder; "" when there is one.
@@ -66,6 +66,11 @@ private:
         std::int64_t end_ns;  ///< on the monotonic clock
         std::uint64_t last_cycle;  ///< of the fastest thread, a bit before the end
     };
+    /// Creates the folder and locks it. A lock ends with its process, so that a folder without one
+    /// is that of a killed machine.
+    void take_folder();
+    /// Renames the folder that a killed machine has left.
+    void keep_folder();
     std::string path_of(std::uint32_t number) const;
     std::vector<std::string> paths(bool with_current) const;
     std::string cut_path() const { return folder_ + "/cut"; }
@@ -84,6 +89,7 @@ private:
     const std::int64_t part_ns_;
     std::string problem_;
     std::string kept_;
+    int lock_ = -1;  // descriptor of the folder
     ExecutionJournal* journal_ = nullptr;
     Machine machine_;
     std::mutex mutex_;  // of all below

@@ -233,6 +233,21 @@ start
         self.wait_for_cycles(10)
         self.assertIn("is now 'run.mcap.ring.1'", self.finish(again))
 
+    def test_the_ring_of_a_machine_that_runs_is_not_taken(self):
+        machine = self.run_journaled(HEAP, "--journal-keep", "4s")
+        self.wait_for_cycles(10)
+        other = ["run", "a.hal", "-N", "other", "--journal", "run.mcap", "--journal-keep", "4s"]
+        self.write("a.hal", HEAP)
+        self.assertEqual(
+            "hal run: cannot write 'run.mcap': another machine keeps its journal in "
+            "'run.mcap.ring'; end that machine, or name another file\n",
+            self.bad(*other),
+        )
+        self.wait_for_cycles(10)
+        self.finish(machine)
+        self.assertIn("no difference", self.replay("run.mcap"))
+        self.assertEqual(0, self.run_program(*other, "--for", "10ms").returncode)
+
     def test_a_fault_writes_the_journal(self):
         machine = self.run_journaled(FAULT, "--journal-keep", "1min")
         written = self.folder / "run-fault-1.mcap"
@@ -286,6 +301,15 @@ start
         self.wait_for_cycles(100)
         self.finish(machine)
         self.assertIn("no difference", self.replay("named.mcap"))
+        two = "journal own.mcap\njournal own.mcap\njournal other.mcap\n"
+        text = self.run_program("check", self.write("b.hal", two)).stderr
+        self.assertEqual(
+            "b.hal:3:1: warning: a machine has one journal, and an earlier line names another "
+            "file: this line is ignored [ignored-option]\n"
+            "    3 | journal other.mcap\n      | ^^^^^^^^^^^^^^^^^^\n"
+            "      = help: remove one of the two lines\nb.hal: no errors\n",
+            text.replace(str(self.folder) + "/", ""),
+        )
         for line, problem in [
             ("journal own.csv", "'own.csv' is not a valid name of a journal"),
             ("journal own.mcap keep=0.1s", "'keep=0.1s' is not a valid duration of a journal"),

@@ -524,6 +524,8 @@ start
             ("step 3 wheel", "the journal has no thread 'wheel'"),
             ("step 0", "the number of cycles is 1 or more"),
             ("goto soon", "goto: write a cycle or a time"),
+            ("goto 1e3", "goto: write a cycle or a time"),
+            ("goto 0.5", "goto: write a cycle or a time"),
             ("break sine =>", "break: invalid condition 'sine =>'"),
             ("reverse", "reverse: no break condition"),
         ]:
@@ -624,6 +626,10 @@ start
         for words, problem in [
             (["--netlist", "no.hal", "--at", "0.3s"], "--netlist: cannot read 'no.hal'"),
             (["--netlist", "same.hal"], "--netlist needs --at CYCLE|TIME"),
+            (
+                ["--netlist", self.write("bogus.hal", MACHINE + "\nbogus line\n"), *at],
+                "unknown command 'bogus'",
+            ),
             (
                 ["--netlist", self.write("more.hal", MACHINE + "newthread t 3000000\n"), *at],
                 "has other threads, and the journal has no cycles of them",

@@ -67,8 +67,12 @@ public:
                 if (!problem.empty()) return problem;
                 continue;
             }
-            const CommandRow* const row = find_command(command.name.text);
-            if (!row || row->edits()) {
+            const CommandRow* const row = row_of(command);
+            if (!row) {
+                return fmt::format("'{}', line {}: unknown command '{}'", path,
+                                   sources_.place(command.span).line, command.name.text);
+            }
+            if (row->edits()) {
                 text_ += line_of(words_of(command));
             }
         }

@@ -164,9 +164,9 @@ public:
                                      options_.program, thread, counted(lost, "cycle")));
         }
         if (!written) {
-            return fail(options_,
-                        fmt::format("cannot write '{}': {}; what was written is in '{}'",
-                                    options_.journal, journal_.problem(), journal_.where()));
+            return fail(options_, fmt::format("cannot write '{}': {}; what was written is in '{}'",
+                                              options_.journal, journal_.problem(),
+                                              ring_ ? ring_->folder() : journal_.where()));
         }
         if (!ring_) {
             write_all(

@@ -2,6 +2,7 @@
 #include "run/stop_rule.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <cstdlib>
 #include <string_view>
@@ -54,7 +55,9 @@ bool JournalPosition::parse(const std::string& text) {
         cycle_ = cycle;
         return true;
     }
-    time_ns_ = parse_duration_ns(text);
+    // a number without a unit would be a time if it is not whole: 1e3 must not mean 1000 s
+    const bool has_unit = !text.empty() && std::isalpha(static_cast<unsigned char>(text.back()));
+    time_ns_ = has_unit ? parse_duration_ns(text) : std::nullopt;
     return time_ns_.has_value();
 }
 
