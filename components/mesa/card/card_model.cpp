@@ -7,42 +7,44 @@
 #include <algorithm>
 #include <array>
 
+#include "mesa/hostmot2/module_kinds.hpp"
 #include "mesa/hostmot2/pin.hpp"
 
 namespace hal::mesa {
 
 namespace {
 
-constexpr ModuleDescriptor watchdog_module{Tag::watchdog, 0, ClockTag::low, 1, 0x0c00, 3, 0, 0};
 constexpr ModuleDescriptor ports_module(std::uint8_t ports) {
-    return {Tag::ioport, 0, ClockTag::low, ports, 0x1000, 5, 0, 0x1f};
+    return module_descriptor(Tag::ioport, 0x1000, {.instances = ports});
 }
 constexpr ModuleDescriptor stepgen_module(std::uint8_t count) {
-    return {Tag::stepgen, 2, ClockTag::low, count, 0x2000, 10, 0, 0x1ff};
+    return module_descriptor(Tag::stepgen, 0x2000, {.instances = count, .version = 2});
 }
 constexpr ModuleDescriptor encoder_module(std::uint8_t count) {
-    return {Tag::encoder, 2, ClockTag::low, count, 0x3000, 5, 0, 0x3};
+    return module_descriptor(Tag::encoder, 0x3000, {.instances = count, .version = 2});
 }
 constexpr ModuleDescriptor muxed_encoder_module(std::uint8_t count) {
-    return {Tag::muxed_encoder, 4, ClockTag::low, count, 0x3500, 5, 0, 0x3};
+    return module_descriptor(Tag::muxed_encoder, 0x3500, {.instances = count, .version = 4});
 }
-constexpr ModuleDescriptor mux_select_module{Tag::mux_select, 0, ClockTag::low, 1, 0, 0, 0, 0};
 constexpr ModuleDescriptor three_phase_module(std::uint8_t count) {
-    return {Tag::three_phase_pwm, 0, ClockTag::high, count, 0x4500, 4, 0, 0x3};
+    return module_descriptor(Tag::three_phase_pwm, 0x4500,
+                             {.instances = count, .clock = ClockTag::high});
 }
-constexpr ModuleDescriptor packet_transmit_module{
-    Tag::packet_uart_transmit, 2, ClockTag::low, 1, 0x6100, 4, 0, 0xf};
-constexpr ModuleDescriptor packet_receive_module{
-    Tag::packet_uart_receive, 2, ClockTag::low, 1, 0x6500, 4, 0, 0xf};
-constexpr ModuleDescriptor inmux_module{Tag::inmux, 0, ClockTag::low, 1, 0x8000, 5, 0, 0x1f};
-constexpr ModuleDescriptor serial_module{
-    Tag::smart_serial, 0, ClockTag::low, 1, 0x5b00, 6, 0x10, 0x3c};
-constexpr ModuleDescriptor dpll_module{Tag::dpll, 0, ClockTag::low, 1, 0x7000, 7, 0, 0};
-constexpr ModuleDescriptor led_module{Tag::led, 0, ClockTag::low, 1, 0x0200, 1, 0, 0};
-constexpr ModuleDescriptor pwm_module{Tag::pwm, 0, ClockTag::high, 1, 0x4100, 5, 0, 0x3};
-constexpr ModuleDescriptor ssr_module{Tag::ssr, 0, ClockTag::low, 1, 0x7d00, 2, 0, 0x3};
-constexpr ModuleDescriptor inm_module{Tag::inm, 0, ClockTag::low, 1, 0x8500, 5, 0, 0x1f};
-constexpr ModuleDescriptor outm_module{Tag::outm, 0, ClockTag::low, 1, 0xb000, 1, 0, 0x1};
+constexpr ModuleDescriptor packet_uart_module(Tag tag, std::uint16_t base) {
+    return module_descriptor(tag, base, {.version = 2});
+}
+constexpr auto packet_transmit_module = packet_uart_module(Tag::packet_uart_transmit, 0x6100);
+constexpr auto packet_receive_module = packet_uart_module(Tag::packet_uart_receive, 0x6500);
+constexpr auto pwm_module = module_descriptor(Tag::pwm, 0x4100, {.clock = ClockTag::high});
+constexpr auto watchdog_module = module_descriptor(Tag::watchdog, 0x0c00);
+constexpr auto inmux_module = module_descriptor(Tag::inmux, 0x8000);
+constexpr auto serial_module = module_descriptor(Tag::smart_serial, 0x5b00);
+constexpr auto dpll_module = module_descriptor(Tag::dpll, 0x7000);
+constexpr auto led_module = module_descriptor(Tag::led, 0x0200);
+constexpr auto ssr_module = module_descriptor(Tag::ssr, 0x7d00);
+constexpr auto inm_module = module_descriptor(Tag::inm, 0x8500);
+constexpr auto outm_module = module_descriptor(Tag::outm, 0xb000);
+constexpr ModuleDescriptor mux_select_module{.tag = Tag::mux_select, .instances = 1};
 
 constexpr ModuleDescriptor modules_7i92[] = {watchdog_module, ports_module(2),    encoder_module(2),
                                              serial_module,   stepgen_module(10), led_module};

@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "mesa/hostmot2/boards.hpp"
+#include "mesa/hostmot2/module_kinds.hpp"
 #include "mesa/lbp16/spaces.hpp"
 
 namespace hal::mesa {
@@ -259,17 +260,11 @@ ModuleUse use_of(Tag tag) noexcept {
     return name_of(tag) == "?" ? ModuleUse::unknown : ModuleUse::unsupported;
 }
 
-CardModule example_module(Tag tag, std::uint8_t version, std::uint8_t instances,
-                          std::uint16_t base) {
+CardModule example_module(Tag tag, std::uint16_t base, const ModuleChoice& choice = {}) {
     CardModule module;
-    module.descriptor.tag = tag;
-    module.descriptor.version = version;
-    module.descriptor.instances = instances;
-    module.descriptor.base = base;
-    module.addresses.base = base;
-    module.addresses.register_stride = 0x100;
-    module.addresses.instance_stride = 4;
-    module.clock_hz = tag == Tag::pwm ? 200'000'000 : 100'000'000;
+    module.descriptor = module_descriptor(tag, base, choice);
+    module.addresses = ModuleAddresses(module.descriptor, Idrom{});
+    module.clock_hz = clock_hz(module.descriptor, Idrom{});
     return module;
 }
 
@@ -401,10 +396,13 @@ CardImage example_card() {
     image.idrom.port_width = 17;
     image.idrom.width = 17;
     image.modules = {
-        example_module(Tag::ioport, 0, 1, 0x1000),   example_module(Tag::stepgen, 2, 1, 0x2000),
-        example_module(Tag::encoder, 3, 1, 0x3000),  example_module(Tag::pwm, 0, 1, 0x4100),
-        example_module(Tag::watchdog, 0, 1, 0x0c00), example_module(Tag::dpll, 0, 1, 0x7000),
-        example_module(Tag::led, 0, 1, 0x0200),
+        example_module(Tag::ioport, 0x1000),
+        example_module(Tag::stepgen, 0x2000, {.version = 2}),
+        example_module(Tag::encoder, 0x3000, {.version = 3}),
+        example_module(Tag::pwm, 0x4100, {.clock = ClockTag::high}),
+        example_module(Tag::watchdog, 0x0c00),
+        example_module(Tag::dpll, 0x7000),
+        example_module(Tag::led, 0x0200),
     };
     image.pins.resize(image.idrom.width);
     image.pins[0].descriptor = {pin_number::stepgen::direction, true, Tag::stepgen, 0};

@@ -3,39 +3,11 @@
 
 #include <algorithm>
 
+#include "module_kinds.hpp"
+
 namespace hal::mesa {
 
 namespace {
-
-constexpr std::uint8_t version_0[] = {0};
-constexpr std::uint8_t encoder_versions[] = {2, 3, 0x83};
-constexpr std::uint8_t muxed_versions[] = {2, 3, 4, 0x84};
-constexpr std::uint8_t stepgen_versions[] = {0, 1, 2, 0x42, 0xc2};
-constexpr std::uint8_t pwm_versions[] = {0, 1};
-constexpr std::uint8_t packet_uart_versions[] = {0, 1, 2, 3};
-
-// As hostmot2 of LinuxCNC accepts them. What it does not check is 0 here.
-constexpr ModuleKind kinds[] = {
-    {Tag::watchdog, "watchdog", version_0, 3, 4, 0},
-    {Tag::ioport, "ioport", version_0, 5, 4, 0x1f},
-    {Tag::encoder, "encoder", encoder_versions, 5, 4, 0x3},
-    {Tag::stepgen, "stepgen", stepgen_versions, 10, 4, 0x1ff},
-    {Tag::pwm, "pwmgen", pwm_versions, 5, 4, 0x3},
-    {Tag::muxed_encoder, "muxed encoder", muxed_versions, 5, 4, 0x3},
-    {Tag::three_phase_pwm, "3pwmgen", version_0, 4, 4, 0x3},
-    {Tag::uart_transmit, "UART transmit", version_0, 4, 0x10, 0xf},
-    {Tag::uart_receive, "UART receive", version_0, 4, 0x10, 0xf},
-    {Tag::packet_uart_transmit, "packet UART transmit", packet_uart_versions, 4, 4, 0xf},
-    {Tag::packet_uart_receive, "packet UART receive", packet_uart_versions, 4, 4, 0xf},
-    {Tag::dpll, "dpll", version_0, 7, 4, 0},
-    {Tag::inmux, "inmux", {}, 0, 0, 0},
-    {Tag::inm, "inm", {}, 0, 0, 0},
-    {Tag::outm, "outm", {}, 0, 0, 0},
-    {Tag::led, "led", version_0, 1, 4, 0},
-    {Tag::smart_serial, "sserial", version_0, 6, 0x40, 0x3c},
-    {Tag::wide_smart_serial, "sserial", version_0, 10, 0x40, 0x3fc},
-    {Tag::ssr, "ssr", {}, 0, 0, 0},
-};
 
 /// Modules without a driver here.
 struct OtherModule {
@@ -104,9 +76,8 @@ ModuleAddresses::ModuleAddresses(const ModuleDescriptor& module, const Idrom& id
           static_cast<std::uint16_t>(idrom.instance_strides[module.strides >> 4 & 1U])) {}
 
 const ModuleKind* kind_of(Tag tag) noexcept {
-    const auto found = std::find_if(std::begin(kinds), std::end(kinds),
-                                    [&](const ModuleKind& kind) { return kind.tag == tag; });
-    return found == std::end(kinds) ? nullptr : found;
+    const auto* const found = std::ranges::find(module_kinds, tag, &ModuleKind::tag);
+    return found == std::end(module_kinds) ? nullptr : found;
 }
 
 std::string_view name_of(Tag tag) noexcept {
@@ -122,7 +93,7 @@ ModuleFault fault_of(const ModuleDescriptor& module, const ModuleKind& kind,
         kind.versions.empty() || std::find(kind.versions.begin(), kind.versions.end(),
                                            module.version) != kind.versions.end();
     if (!known_version) return ModuleFault::version;
-    if (kind.registers != 0) {
+    if (kind.is_checked) {
         const ModuleAddresses addresses(module, idrom);
         if (module.registers != kind.registers) return ModuleFault::registers;
         if (addresses.instance_stride != kind.instance_stride) {

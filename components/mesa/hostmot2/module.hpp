@@ -82,9 +82,10 @@ struct ModuleKind {
     Tag tag;
     std::string_view name;  ///< "stepgen", as in the config string of a driver
     std::span<const std::uint8_t> versions;  ///< empty: any
-    std::uint8_t registers;  ///< 0: any
-    std::uint16_t instance_stride;  ///< 0: any
+    std::uint8_t registers;
+    std::uint16_t instance_stride;
     std::uint32_t per_instance;
+    bool is_checked = true;  ///< whether a descriptor has to have these three
 };
 /// Returns nothing for an unknown module. [any]
 const ModuleKind* kind_of(Tag tag) noexcept;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "link/datagram.hpp"
+#include "mesa/hostmot2/module_kinds.hpp"
 #include "mesa/hostmot2/pin.hpp"
 #include "mesa/lbp16/packet.hpp"
 #include "mesa/lbp16/spaces.hpp"
@@ -28,9 +29,9 @@ public:
         idrom.ports = 3;
         idrom.port_width = 17;
         idrom.width = 51;
-        modules = {{Tag::ioport, 0, ClockTag::low, 3, 0x1000, 5, 0x00, 0x1f},
-                   {Tag::watchdog, 0, ClockTag::low, 1, 0x0c00, 3, 0x00, 0x00},
-                   {Tag::stepgen, 2, ClockTag::low, 3, 0x2000, 10, 0x00, 0x1ff}};
+        modules = {module_descriptor(Tag::ioport, 0x1000, {.instances = 3}),
+                   module_descriptor(Tag::watchdog, 0x0c00),
+                   module_descriptor(Tag::stepgen, 0x2000, {.instances = 3, .version = 2})};
         store_tables();
     }
 
