@@ -7,16 +7,9 @@ folder of the modules, if it is not that of the Debian package linuxcnc-uspace. 
 """
 
 import re
-import sys
-import tempfile
-from pathlib import Path
 
-from checks import check, checked, skip, wait_for
-from mesa_machine import HOST, MODULES, Machine
-
-ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "tests/cli"))
-from own_network import own_network  # noqa: E402
+from checks import check, wait_for
+from mesa_machine import Machine, drive_machine, hm2_eth_netlist
 
 SCALE = 100
 AXES = ("x", "y", "z")
@@ -37,27 +30,16 @@ encoder = 0
 [output coolant]
 terminal = remote 0 3
 """
-# A busy host loses packets: the driver may not give up for that.
-NETLIST = f"""loadrt threads name1=servo period1=4000000
-loadrt hostmot2
-loadrt hm2_eth board_ip={HOST} config="num_encoders=1 num_stepgens=3 sserial_port_0=00xxxxxx"
-loadrt limit3 names=x,y,z
-addf hm2_7i76e.0.read servo
-addf x servo
-addf y servo
-addf z servo
-addf hm2_7i76e.0.write servo
-setp hm2_7i76e.0.watchdog.timeout_ns 1000000000
-setp hm2_7i76e.0.packet-error-limit 1000000
-setp hm2_7i76e.0.encoder.00.scale 4096
-setp hm2_7i76e.0.7i76.0.0.spinout-scalemax 24000
-setp hm2_7i76e.0.7i76.0.0.spinout-maxlim 24000
-setp hm2_7i76e.0.7i76.0.0.spinout 24000
-setp hm2_7i76e.0.7i76.0.0.spinena TRUE
-setp hm2_7i76e.0.7i76.0.0.output-03 TRUE
+CARD_NAME = "hm2_7i76e.0"
+SETTINGS = f"""setp {CARD_NAME}.encoder.00.scale 4096
+setp {CARD_NAME}.7i76.0.0.spinout-scalemax 24000
+setp {CARD_NAME}.7i76.0.0.spinout-maxlim 24000
+setp {CARD_NAME}.7i76.0.0.spinout 24000
+setp {CARD_NAME}.7i76.0.0.spinena TRUE
+setp {CARD_NAME}.7i76.0.0.output-03 TRUE
 """
 for n, axis in enumerate(AXES):
-    NETLIST += f"net {axis}-command {axis}.out => hm2_7i76e.0.stepgen.{n:02}.position-cmd\n"
+    SETTINGS += f"net {axis}-command {axis}.out => hm2_7i76e.0.stepgen.{n:02}.position-cmd\n"
     for name, value in (
         ("position-scale", SCALE),
         ("steplen", 5000),
@@ -70,9 +52,14 @@ for n, axis in enumerate(AXES):
         ("velocity-cmd", -10),
         ("enable", "TRUE"),
     ):
-        NETLIST += f"setp hm2_7i76e.0.stepgen.{n:02}.{name} {value}\n"
-    NETLIST += f"setp {axis}.maxv 30\nsetp {axis}.maxa 300\n"
-NETLIST += "start\n"
+        SETTINGS += f"setp hm2_7i76e.0.stepgen.{n:02}.{name} {value}\n"
+    SETTINGS += f"setp {axis}.maxv 30\nsetp {axis}.maxa 300\n"
+NETLIST = hm2_eth_netlist(
+    CARD_NAME,
+    "num_encoders=1 num_stepgens=3 sserial_port_0=00xxxxxx",
+    "loadrt limit3 names=x,y,z\n" + "\n".join(f"addf {axis} servo" for axis in AXES),
+    SETTINGS,
+)
 PROGRAM = ((10, 5, -2), (10, 15, -4), (-1.37, 15, 0.01), (0, 0, 0))
 
 
@@ -151,16 +138,4 @@ def drive(machine):
     check("the end of hm2_eth bites", "watchdog has bitten" in machine.log("card.log"))
 
 
-if not (MODULES / "hm2_eth.so").exists():
-    skip("LinuxCNC's hm2_eth is missing; type: apt-get install linuxcnc-uspace")
-if not own_network():
-    skip("no network namespaces here; run it as root, or where user namespaces are allowed")
-with tempfile.TemporaryDirectory(prefix="hal-hm2-") as name:
-    one = Mill(Path(name))
-    try:
-        if not one.connect():
-            skip("no veth pairs here")
-        drive(one)
-    finally:
-        one.end()
-sys.exit(checked())
+drive_machine(Mill, drive)

@@ -4,9 +4,13 @@
 import os
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
-from checks import check, wait_for
+from checks import check, checked, skip, wait_for
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests/cli"))
+from own_network import own_network  # noqa: E402
 
 MODULES = Path(os.environ.get("HAL_RTMOD_DIR", "/usr/lib/linuxcnc/modules"))
 HAL = str(Path(sys.argv[1]).resolve())
@@ -14,21 +18,22 @@ HOST = "10.10.10.10"
 SETTINGS = (("watchdog.timeout_ns", 1000000000), ("packet-error-limit", 1000000))
 
 
-def hm2_eth_netlist(card, config):
-    """Loads LinuxCNC's driver. A busy host loses packets: the driver may not give up for that."""
-    loads = f'loadrt hostmot2\nloadrt hm2_eth board_ip={HOST} config="{config}"\n'
-    return "loadrt threads name1=servo period1=4000000\n" + loads + netlist_end(card)
+def hm2_eth_netlist(card, config, between="", settings=""):
+    """Loads LinuxCNC's driver. `between`: lines between its functions; `settings`: further ones."""
+    loads = f'loadrt hostmot2\nloadrt hm2_eth board_ip={HOST} config="{config}"'
+    return netlist(card, loads, between, settings)
 
 
 def native_netlist(card, config):
-    loads = f'loadrt mesa board=eth:{HOST} config="{config}"\n'
-    return "loadrt threads name1=servo period1=4000000\n" + loads + netlist_end(card)
+    return netlist(card, f'loadrt mesa board=eth:{HOST} config="{config}"')
 
 
-def netlist_end(card):
-    lines = [f"addf {card}.{function} servo" for function in ("read", "write")]
+def netlist(card, loads, between="", settings=""):
+    """A busy host loses packets: the driver may not give up for that."""
+    lines = ["loadrt threads name1=servo period1=4000000", loads, f"addf {card}.read servo"]
+    lines += [between, f"addf {card}.write servo"]
     lines += [f"setp {card}.{name} {value}" for name, value in SETTINGS]
-    return "\n".join(lines) + "\nstart\n"
+    return "\n".join(lines + [settings, "start"]) + "\n"
 
 
 class Machine:
@@ -116,3 +121,21 @@ class Machine:
         for process in reversed(self.running):
             process.terminate()
             process.wait(60)
+
+
+def drive_machine(make, *steps):
+    """Calls each step with `make(folder)`, a Machine that is connected, and ends the program. 77: LinuxCNC's modules or network namespaces are missing."""
+    if not (MODULES / "hm2_eth.so").exists():
+        skip("LinuxCNC's hm2_eth is missing; type: apt-get install linuxcnc-uspace")
+    if not own_network():
+        skip("no network namespaces here; run it as root, or where user namespaces are allowed")
+    with tempfile.TemporaryDirectory(prefix="hal-hm2-") as name:
+        machine = make(Path(name))
+        try:
+            if not machine.connect():
+                skip("no veth pairs here")
+            for step in steps:
+                step(machine)
+        finally:
+            machine.end()
+    sys.exit(checked())

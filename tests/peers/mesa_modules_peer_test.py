@@ -7,16 +7,9 @@ modules or network namespaces are missing.
 """
 
 import re
-import sys
-import tempfile
-from pathlib import Path
 
-from checks import check, checked, skip, wait_for
-from mesa_machine import HAL, MODULES, Machine, hm2_eth_netlist, native_netlist
-
-ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "tests/cli"))
-from own_network import own_network  # noqa: E402
+from checks import check, wait_for
+from mesa_machine import HAL, Machine, drive_machine, hm2_eth_netlist, native_netlist
 
 MOTOR = """[motor x]
 stepgen = 0
@@ -247,18 +240,4 @@ def muxed(machine):
         check("both see the same", seen["hm2_eth"] == seen["mesa"], seen)
 
 
-if not (MODULES / "hm2_eth.so").exists():
-    skip("LinuxCNC's hm2_eth is missing; type: apt-get install linuxcnc-uspace")
-if not own_network():
-    skip("no network namespaces here; run it as root, or where user namespaces are allowed")
-with tempfile.TemporaryDirectory(prefix="hal-hm2-") as name:
-    one = Machines(Path(name))
-    try:
-        if not one.connect():
-            skip("no veth pairs here")
-        latch(one)
-        bridge(one)
-        muxed(one)
-    finally:
-        one.end()
-sys.exit(checked())
+drive_machine(Machines, latch, bridge, muxed)
