@@ -2,6 +2,7 @@
 #include "cycle_link.hpp"
 
 #include <algorithm>
+#include <optional>
 
 #include "mesa/lbp16/spaces.hpp"
 
@@ -9,43 +10,40 @@ namespace hal::mesa {
 
 namespace {
 
-/// Counts are two units of 16 bits, the low one first.
-bool put_count(Request& request, std::uint16_t address, std::uint32_t count) noexcept {
+/// Counts are two units of 16 bits, the low one first. Returns the offset of the count.
+std::optional<std::size_t> put_count(Request& request, std::uint16_t address,
+                                     std::uint32_t count) noexcept {
     std::array<std::uint8_t, 4> data;
     store(data.data(), count);
-    return request.write(Space::timers, address, Unit::u16, data).has_value();
+    return request.write(Space::timers, address, Unit::u16, data);
 }
 
 }  // namespace
 
 CycleLink::CycleLink(datagram::Port& port, ReadLayout layout, std::uint16_t session)
-    : port_(port), layout_(std::move(layout)), session_(session) {
-    if (!append_reads(reads_)) {
+    : port_(port), layout_(std::move(layout)), session_(session), reads_(layout_.request()) {
+    const auto packets = reads_.read(Space::status, status::received_packets, Unit::u16);
+    const auto count = put_count(reads_, timers::read_count, number(read_count_));
+    const auto counts = reads_.read(Space::timers, timers::scratch, Unit::u16, 4);
+    if (!packets || !count || !counts) {
         throw CardError(
             "the modules in use need more than the 1400 bytes of a datagram in each cycle; use "
             "fewer of them in config=");
     }
     reply_size_ = reads_.reply_size();
-    counts_offset_ = reply_size_ - 8;
-}
-
-bool CycleLink::append_reads(Request& request) noexcept {
-    return layout_.append_to(request) &&
-           request.read(Space::status, status::received_packets, Unit::u16).has_value() &&
-           put_count(request, timers::read_count, number(read_count_)) &&
-           request.read(Space::timers, timers::scratch, Unit::u16, 4).has_value();
+    read_count_offset_ = *count;
+    counts_offset_ = *counts;
 }
 
 void CycleLink::request(std::int64_t now_ns) noexcept {
     if (is_requested_) return;
     note_request(now_ns, false);
-    reads_.clear();
-    append_reads(reads_);
     port_.send(reads_.bytes(), now_ns);
 }
 
 void CycleLink::note_request(std::int64_t now_ns, bool is_joined) noexcept {
-    ++read_count_;
+    reads_.set(read_count_offset_, number(++read_count_));
+    layout_.follow_addresses(reads_);
     is_requested_ = true;
     is_joined_ = is_joined;
     requested_ns_ = now_ns;
@@ -110,8 +108,7 @@ bool CycleLink::begin_send(std::int64_t now_ns, bool requests, std::size_t late_
     const std::size_t size = writes_.size() + reads_.size() + late_size + count_size;
     if (!requests || is_requested_ || size > max_datagram) return false;
     note_request(now_ns, true);
-    append_reads(writes_);
-    return true;
+    return writes_.append(reads_);
 }
 
 void CycleLink::end_send(std::int64_t now_ns, bool requests) noexcept {

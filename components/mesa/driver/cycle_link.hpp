@@ -94,7 +94,6 @@ private:
 
     static constexpr std::size_t count_size = 8;  // of the command that writes one
 
-    bool append_reads(Request& request) noexcept;
     bool begin_send(std::int64_t now_ns, bool requests, std::size_t late_size) noexcept;
     void end_send(std::int64_t now_ns, bool requests) noexcept;
     void note_request(std::int64_t now_ns, bool is_joined) noexcept;
@@ -108,7 +107,9 @@ private:
     datagram::Port& port_;
     const ReadLayout layout_;
     const std::uint16_t session_;
-    Request reads_, writes_;
+    Request reads_;  ///< of a cycle, with the newest number
+    Request writes_;
+    std::size_t read_count_offset_ = 0;  ///< of the number in the reads
     std::size_t reply_size_ = 0;
     std::size_t counts_offset_ = 0;
     std::uint16_t read_count_ = 0;

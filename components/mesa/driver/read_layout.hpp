@@ -26,14 +26,13 @@ public:
                 "the modules in use need more than the 1400 bytes of a datagram in each cycle; "
                 "use fewer of them in config=");
         }
-        regions_.push_back({space, address, unit, count});
         return *offset;
     }
     /// Adds a register whose address may change while the card is in use; `address` outlives the
     /// layout. [setup]
     std::size_t add_at(const std::uint16_t& address) {
         const std::size_t offset = add(address);
-        regions_.back().source = &address;
+        followers_.push_back({whole_.size() - sizeof address, &address});
         return offset;
     }
     /// Adds register `reg` of the instances 0..count-1 of a module. Returns the offset of the first;
@@ -48,31 +47,21 @@ public:
         return first;
     }
 
-    /// Appends the reads to a request. Returns false when it has no space for them; it then has a
-    /// part of them. [realtime]
-    bool append_to(Request& request) const noexcept {
-        for (const Region& region : regions_) {
-            const std::uint16_t address =
-                region.source != nullptr ? *region.source : region.address;
-            if (!request.read(region.space, address, region.unit, region.count)) {
-                return false;
-            }
+    /// Returns the reads of a cycle. [any]
+    const Request& request() const noexcept { return whole_; }
+    /// Stores the addresses that have changed in `request`, which begins with request(). [realtime]
+    void follow_addresses(Request& request) const noexcept {
+        for (const Follower& follower : followers_) {
+            request.set(follower.offset, *follower.address);
         }
-        return true;
     }
-    /// Bytes of the reads in a request, and of their answer. [any]
-    std::size_t request_size() const noexcept { return whole_.size(); }
-    std::size_t reply_size() const noexcept { return whole_.reply_size(); }
 
 private:
-    struct Region {
-        Space space;
-        std::uint16_t address;
-        Unit unit;
-        std::size_t count;
-        const std::uint16_t* source = nullptr;  ///< of an address that may change
+    struct Follower {
+        std::size_t offset;  ///< of the address in the request
+        const std::uint16_t* address;
     };
-    std::vector<Region> regions_;
+    std::vector<Follower> followers_;
     Request whole_;
 };
 

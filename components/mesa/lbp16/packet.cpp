@@ -70,6 +70,16 @@ std::optional<std::size_t> Request::write32(std::uint16_t address, std::uint32_t
     return write(Space::hostmot2, address, Unit::u32, data);
 }
 
+bool Request::append(const Request& other) noexcept {
+    if (size_ + other.size_ > max_datagram) return false;
+    if (reply_size_ + other.reply_size_ > max_datagram) return false;
+    std::copy_n(other.bytes_.begin(), other.size_,
+                bytes_.begin() + static_cast<std::ptrdiff_t>(size_));
+    size_ += other.size_;
+    reply_size_ += other.reply_size_;
+    return true;
+}
+
 RequestReader::Next RequestReader::next(Command& command,
                                         std::span<const std::uint8_t>& data) noexcept {
     data = {};

@@ -99,6 +99,10 @@ public:
     /// Appends a write of one 32-bit register of HostMot2. [any]
     std::optional<std::size_t> write32(std::uint16_t address, std::uint32_t value) noexcept;
 
+    /// Appends the commands of another request. Returns false, and appends nothing, if request or
+    /// reply would become too long. [any]
+    bool append(const Request& other) noexcept;
+
     /// Stores a number at an offset that write() returned. [any]
     template <std::integral T>
     void set(std::size_t offset, T value) noexcept {

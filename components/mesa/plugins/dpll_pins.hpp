@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
 #include <vector>
 
 #include "mesa/hostmot2/formulas.hpp"
@@ -41,7 +40,7 @@ public:
           prescale_(o.component, "dpll.prescale", "divider of its clock; it is computed",
                     {.initial = 1}) {
         for (unsigned n = 1; n <= 4; ++n) {
-            timer_us_.push_back(std::make_unique<hal::In<double>>(
+            timer_us_.push_back(place<hal::In<double>>(
                 o.component, o.write, pin_name("dpll", n, "timer-us").c_str(),
                 "when the timer latches, after the reading; negative: before it",
                 hal::PinOptions<double>{.initial = 100.0, .unit = "us"}));
@@ -103,7 +102,7 @@ private:
     Setting base_;
     const std::uint16_t preset_address_;
     Setting control_0_, control_1_, timers_1_2_, timers_3_4_;
-    std::vector<std::unique_ptr<hal::In<double>>> timer_us_;
+    std::vector<Placed<hal::In<double>>> timer_us_;
     hal::In<double> base_freq_khz_;
     hal::In<std::uint32_t> time_const_, plimit_;
     hal::Out<double> phase_error_us_;

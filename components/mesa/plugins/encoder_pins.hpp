@@ -3,7 +3,6 @@
 #pragma once
 
 #include <cmath>
-#include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -86,7 +85,7 @@ public:
         hal::Retained(o.component, {{named(unit, "zero"), zero_}});
         hal::Retained(o.component, {{named(unit, "is-uncertain"), is_uncertain_}});
         if ((module.descriptor.version & encoder::version_with_probe) != 0) {
-            probe_ = std::make_unique<Probe>(o, unit);
+            probe_ = place<Probe>(o, unit);
         }
     }
 
@@ -260,7 +259,7 @@ private:
     ScaleParam scale_;
     hal::Param<bool> index_invert_, index_mask_, index_mask_invert_, counter_mode_, filter_;
     hal::Param<double> vel_timeout_;
-    std::unique_ptr<Probe> probe_;  ///< of firmware that has one
+    Placed<Probe> probe_;  ///< of firmware that has one
 };
 
 class EncoderPins final : public ModulePins {
@@ -274,7 +273,7 @@ public:
                  "TRUE: times of edges in 0.1 us, for periods up to 6 ms; FALSE: in 0.5 us") {
         const bool is_muxed = module.tag() == Tag::muxed_encoder;
         units_ = make_units<Encoder>(o, module);
-        frequency_ = std::make_unique<hal::In<std::uint32_t>>(
+        frequency_ = place<hal::In<std::uint32_t>>(
             o.component, o.write,
             is_muxed ? "encoder.muxed-sample-frequency" : "encoder.sample-frequency",
             "samples per second of A, B and index",
@@ -282,7 +281,7 @@ public:
                                            .unit = "Hz"});
         const unsigned version = module.descriptor.version & ~unsigned{encoder::version_with_probe};
         if (is_muxed && version >= encoder::version_with_skew) {
-            skew_ = std::make_unique<hal::In<std::uint32_t>>(
+            skew_ = place<hal::In<std::uint32_t>>(
                 o.component, o.write, "encoder.muxed-skew",
                 "delay of the samples behind the multiplexer, at most 15 clocks of the card",
                 hal::PinOptions<std::uint32_t>{.unit = "ns"});
@@ -338,10 +337,10 @@ private:
     const ModuleAddresses addresses_;
     const std::uint32_t clock_hz_;
     Setting divider_, filter_;
-    std::vector<std::unique_ptr<Encoder>> units_;
+    std::vector<Placed<Encoder>> units_;
     hal::In<bool> hires_;
-    std::unique_ptr<hal::In<std::uint32_t>> frequency_;
-    std::unique_ptr<hal::In<std::uint32_t>> skew_;
+    Placed<hal::In<std::uint32_t>> frequency_;
+    Placed<hal::In<std::uint32_t>> skew_;
     std::optional<LatchTimer> timer_;
     std::size_t now_ = 0;
     std::size_t counts_ = 0;

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <algorithm>
-#include <memory>
 #include <vector>
 
 #include "mesa/driver/position_counter.hpp"
@@ -35,10 +34,10 @@ public:
           scan_width_(o.component, o.read, named(prefix, unit, "scan_width").c_str(),
                       "number of inputs", {.initial = width}) {
         for (unsigned n = 0; n < width; ++n) {
-            inputs_.push_back(std::make_unique<Input>(o, prefix, unit, n));
+            inputs_.push_back(place<Input>(o, prefix, unit, n));
         }
         for (unsigned n = 0; n < counters && 2 * n + 1 < width; ++n) {
-            wheels_.push_back(std::make_unique<Wheel>(o, prefix, unit, n));
+            wheels_.push_back(place<Wheel>(o, prefix, unit, n));
         }
     }
 
@@ -137,8 +136,8 @@ private:
     Setting control_, filter_, modes_;
     hal::Param<std::uint32_t> scan_rate_, fast_scans_, slow_scans_;
     hal::Out<std::uint32_t> scan_width_;
-    std::vector<std::unique_ptr<Input>> inputs_;
-    std::vector<std::unique_ptr<Wheel>> wheels_;
+    std::vector<Placed<Input>> inputs_;
+    std::vector<Placed<Wheel>> wheels_;
 };
 
 class InputPins final : public ModulePins {
@@ -148,8 +147,7 @@ public:
         : addresses_(module.addresses) {
         const char* const prefix = module.tag() == Tag::inm ? "inm" : "inmux";
         for (unsigned unit = 0; unit < widths.size(); ++unit) {
-            units_.push_back(
-                std::make_unique<FilteredInputs>(o, prefix, unit, module, widths[unit]));
+            units_.push_back(place<FilteredInputs>(o, prefix, unit, module, widths[unit]));
         }
     }
     void plan(ReadLayout& layout) override {
@@ -172,7 +170,7 @@ public:
 
 private:
     const ModuleAddresses addresses_;
-    std::vector<std::unique_ptr<FilteredInputs>> units_;
+    std::vector<Placed<FilteredInputs>> units_;
     std::size_t filtered_ = 0;
     std::size_t raw_ = 0;
     std::size_t counts_ = 0;

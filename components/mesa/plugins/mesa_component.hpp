@@ -5,6 +5,7 @@
 #include <atomic>
 #include <bit>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "bus/component/bus_component.hpp"
@@ -61,7 +62,7 @@ struct MesaComponent : LoadedCard, hal::bus::BusComponent {
             clock_.claim();
         }
         build_stop();
-        link_ = std::make_unique<CycleLink>(*port_, layout_, session());
+        link_.emplace(*port_, layout_, session());
         monitor_.restart();
         rewrites_ = true;
         was_lost_ = false;
@@ -173,7 +174,7 @@ private:
 
     template <class Pins, class... Arguments>
     Pins* add(Arguments&&... arguments) {
-        auto pins = std::make_unique<Pins>(std::forward<Arguments>(arguments)...);
+        auto pins = place<Pins>(std::forward<Arguments>(arguments)...);
         Pins* const added = pins.get();
         modules_.push_back(std::move(pins));
         return added;
@@ -182,7 +183,7 @@ private:
     void declare_modules() {
         const PinOwner owner{*this, read_, write_};
         const CardModule& ports = *image_.find(Tag::ioport);
-        ports_ = std::make_unique<PortPins>(owner, image_, ports);
+        ports_ = place<PortPins>(owner, image_, ports);
         const CardModule* const dpll = image_.find(Tag::dpll);
         const bool has_dpll = dpll != nullptr && dpll->used > 0;
         if (has_dpll) {
@@ -570,8 +571,8 @@ private:
                                           "time without a write until the watchdog bites",
                                           {.initial = 5'000'000, .unit = "ns"}};
 
-    std::vector<std::unique_ptr<ModulePins>> modules_;
-    std::unique_ptr<PortPins> ports_;
+    std::vector<Placed<ModulePins>> modules_;
+    Placed<PortPins> ports_;
     StepgenPins* stepgens_ = nullptr;  // these four are in `modules_`
     EncoderPins* encoders_ = nullptr;
     DpllPins* dpll_ = nullptr;
@@ -584,7 +585,7 @@ private:
     std::uint32_t sent_timeout_ = 0;
     Request stop_;
 
-    std::unique_ptr<CycleLink> link_;
+    std::optional<CycleLink> link_;
     CardMonitor monitor_;
     std::unique_ptr<EventTexts> texts_;
     std::size_t unused_modules_ = 0;

@@ -4,7 +4,6 @@
 
 #include <cstdarg>
 #include <cstdio>
-#include <memory>
 #include <string>
 #include <vector>
 
@@ -12,6 +11,7 @@
 #include "mesa/driver/card_image.hpp"
 #include "mesa/driver/outgoing.hpp"
 #include "mesa/driver/read_layout.hpp"
+#include "working_set.hpp"
 
 namespace hal::mesa {
 
@@ -84,17 +84,17 @@ inline std::string pin_name(const char* prefix, unsigned unit, const char* name)
 
 /// Declares the units of a module that are used. [setup]
 template <class Unit>
-std::vector<std::unique_ptr<Unit>> make_units(const PinOwner& o, const CardModule& module) {
-    std::vector<std::unique_ptr<Unit>> units;
+std::vector<Placed<Unit>> make_units(const PinOwner& o, const CardModule& module) {
+    std::vector<Placed<Unit>> units;
     for (unsigned unit = 0; unit < module.used; ++unit) {
-        units.push_back(std::make_unique<Unit>(o, unit, module));
+        units.push_back(place<Unit>(o, unit, module));
     }
     return units;
 }
 
 /// Calls `report(n)` for each unit whose `member()` returns true. [realtime]
 template <class Unit, class Report>
-void report_each(const std::vector<std::unique_ptr<Unit>>& units, bool (Unit::*member)() noexcept,
+void report_each(const std::vector<Placed<Unit>>& units, bool (Unit::*member)() noexcept,
                  Report&& report) noexcept {
     for (std::size_t n = 0; n < units.size(); ++n) {
         if (((*units[n]).*member)()) {

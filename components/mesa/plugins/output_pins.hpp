@@ -3,7 +3,6 @@
 #pragma once
 
 #include <algorithm>
-#include <memory>
 #include <vector>
 
 #include "mesa/hostmot2/formulas.hpp"
@@ -27,7 +26,7 @@ public:
         }
         std::ranges::sort(numbers);
         for (const unsigned number : numbers) {
-            outputs_.push_back(std::make_unique<Output>(o, prefix, unit, number));
+            outputs_.push_back(place<Output>(o, prefix, unit, number));
         }
     }
     std::uint32_t bits() const noexcept {
@@ -52,7 +51,7 @@ private:
     static const char* named(const char* prefix, unsigned unit, const char* name, unsigned number) {
         return brief_name("%s.%02u.%s-%02u", prefix, unit, name, number);
     }
-    std::vector<std::unique_ptr<Output>> outputs_;
+    std::vector<Placed<Output>> outputs_;
 };
 
 class SsrPins final : public ModulePins {
@@ -60,7 +59,7 @@ public:
     SsrPins(const PinOwner& o, const CardImage& image, const CardModule& module)
         : clock_hz_(module.clock_hz) {
         for (unsigned unit = 0; unit < module.used; ++unit) {
-            units_.push_back(std::make_unique<Unit>(o, image, module, unit));
+            units_.push_back(place<Unit>(o, image, module, unit));
         }
     }
     void transmit(Outgoing& out, const Writing& writing) noexcept override {
@@ -91,14 +90,14 @@ private:
         hal::In<std::uint32_t> rate_hz;
     };
     const std::uint32_t clock_hz_;
-    std::vector<std::unique_ptr<Unit>> units_;
+    std::vector<Placed<Unit>> units_;
 };
 
 class OutmPins final : public ModulePins {
 public:
     OutmPins(const PinOwner& o, const CardImage& image, const CardModule& module) {
         for (unsigned unit = 0; unit < module.used; ++unit) {
-            units_.push_back(std::make_unique<Unit>(o, image, module, unit));
+            units_.push_back(place<Unit>(o, image, module, unit));
         }
     }
     void transmit(Outgoing& out, const Writing& writing) noexcept override {
@@ -120,7 +119,7 @@ private:
         Setting data;
         OutputBits bits;
     };
-    std::vector<std::unique_ptr<Unit>> units_;
+    std::vector<Placed<Unit>> units_;
 };
 
 class LedPins final : public ModulePins {
@@ -129,8 +128,7 @@ public:
         for (unsigned n = 0; n < module.used; ++n) {
             char name[24];
             std::snprintf(name, sizeof name, "led.CR%02u", n + 1);
-            leds_.push_back(
-                std::make_unique<hal::In<bool>>(o.component, o.write, name, "LED of the card"));
+            leds_.push_back(place<hal::In<bool>>(o.component, o.write, name, "LED of the card"));
         }
     }
     void transmit(Outgoing& out, const Writing&) noexcept override {
@@ -143,7 +141,7 @@ public:
 
 private:
     Setting data_;
-    std::vector<std::unique_ptr<hal::In<bool>>> leds_;
+    std::vector<Placed<hal::In<bool>>> leds_;
 };
 
 }  // namespace hal::mesa

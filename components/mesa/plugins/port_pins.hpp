@@ -3,7 +3,6 @@
 #pragma once
 
 #include <bit>
-#include <deque>
 #include <optional>
 #include <string>
 #include <vector>
@@ -54,8 +53,6 @@ public:
     }
 
 private:
-    // all of a pin is in one place: a cycle that comes once in a millisecond finds nothing of it in
-    // the caches
     using Parameter = std::optional<hal::Param<bool>>;
     static constexpr const char* open_drain_doc = "TRUE: an output of TRUE leaves the pin floating";
     static constexpr const char* invert_doc = "TRUE: the output is inverted";
@@ -76,7 +73,7 @@ public:
     PortPins(const PinOwner& o, const CardImage& image, const CardModule& module)
         : addresses_(module.addresses), ports_(image.idrom.ports), width_(image.idrom.port_width) {
         for (unsigned n = 0; n < image.pins.size(); ++n) {
-            pins_.emplace_back(o, n, image.pins[n]);
+            pins_.push_back(place<PortPin>(o, n, image.pins[n]));
         }
         for (unsigned port = 0; port < ports_; ++port) {
             registers_.emplace_back(addresses_, port);
@@ -167,13 +164,13 @@ private:
         changed &= ~0U >> (32 - width_);
         for (; changed != 0; changed &= changed - 1) {
             const auto n = static_cast<unsigned>(std::countr_zero(changed));
-            pins_[port * width_ + n].show((levels >> n & 1U) != 0);
+            pins_[port * width_ + n]->show((levels >> n & 1U) != 0);
         }
     }
     Bits bits_of(unsigned port) const noexcept {
         Bits bits;
         for (unsigned n = 0; n < width_ && port * width_ + n < pins_.size(); ++n) {
-            const PortPin& pin = pins_[port * width_ + n];
+            const PortPin& pin = *pins_[port * width_ + n];
             if (!pin.is_output()) continue;  // level and inversion are those of outputs
             const std::uint32_t bit = 1U << n;
             bits.direction |= bit;
@@ -187,7 +184,7 @@ private:
 
     const ModuleAddresses addresses_;
     const unsigned ports_, width_;
-    std::deque<PortPin> pins_;
+    std::vector<Placed<PortPin>> pins_;
     std::vector<Registers> registers_;
     std::size_t levels_ = 0;
 };

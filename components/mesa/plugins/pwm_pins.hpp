@@ -3,7 +3,6 @@
 #pragma once
 
 #include <cmath>
-#include <memory>
 #include <vector>
 
 #include "mesa/hostmot2/formulas.hpp"
@@ -116,7 +115,7 @@ public:
 private:
     const std::uint32_t clock_hz_;
     Setting pwm_rate_, pdm_rate_, enables_;
-    std::vector<std::unique_ptr<PwmGenerator>> units_;
+    std::vector<Placed<PwmGenerator>> units_;
     hal::Param<std::uint32_t> pwm_frequency_, pdm_frequency_;
 };
 

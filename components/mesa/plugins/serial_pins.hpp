@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <memory>
 #include <vector>
 
 #include "mesa/driver/position_counter.hpp"
@@ -79,54 +78,53 @@ private:
     }
     void add_bit(const PinOwner& o, const std::string& name, bool is_output) {
         if (is_output) {
-            bits_in_.push_back(std::make_unique<hal::In<bool>>(o.component, o.write, name.c_str(),
-                                                               "output of the device"));
-            inverts_.push_back(std::make_unique<hal::Param<bool>>(
-                o.component, (name + "-invert").c_str(), "TRUE: the output is inverted"));
+            bits_in_.push_back(
+                place<hal::In<bool>>(o.component, o.write, name.c_str(), "output of the device"));
+            inverts_.push_back(place<hal::Param<bool>>(o.component, (name + "-invert").c_str(),
+                                                       "TRUE: the output is inverted"));
             return;
         }
-        bits_out_.push_back(std::make_unique<hal::Out<bool>>(o.component, o.read, name.c_str(),
-                                                             "input of the device"));
-        bits_not_.push_back(std::make_unique<hal::Out<bool>>(
-            o.component, o.read, (name + "-not").c_str(), "input of the device, inverted"));
+        bits_out_.push_back(
+            place<hal::Out<bool>>(o.component, o.read, name.c_str(), "input of the device"));
+        bits_not_.push_back(place<hal::Out<bool>>(o.component, o.read, (name + "-not").c_str(),
+                                                  "input of the device, inverted"));
     }
     void declare_number(const PinOwner& o, const std::string& name, bool is_output) {
         const Record& r = field_.record;
         const bool has_range = r.min != r.max;
         const double max = has_range ? r.max : 1.0;
         const double min = has_range ? r.min : 0.0;
-        scale_max_ = std::make_unique<hal::Param<double>>(o.component, (name + "-scalemax").c_str(),
-                                                          "value of the largest number",
-                                                          hal::PinOptions<double>{.initial = max});
+        scale_max_ = place<hal::Param<double>>(o.component, (name + "-scalemax").c_str(),
+                                               "value of the largest number",
+                                               hal::PinOptions<double>{.initial = max});
         if (!is_output) {
-            number_out_ = std::make_unique<hal::Out<double>>(
+            number_out_ = place<hal::Out<double>>(
                 o.component, o.read, name.c_str(), "input of the device",
                 hal::PinOptions<double>{.unit = field_.record.unit.c_str()});
             return;
         }
-        number_in_ = std::make_unique<hal::In<double>>(
-            o.component, o.write, name.c_str(), "output of the device",
-            hal::PinOptions<double>{.unit = field_.record.unit.c_str()});
-        max_limit_ = std::make_unique<hal::Param<double>>(o.component, (name + "-maxlim").c_str(),
-                                                          "largest value",
-                                                          hal::PinOptions<double>{.initial = max});
-        min_limit_ = std::make_unique<hal::Param<double>>(o.component, (name + "-minlim").c_str(),
-                                                          "smallest value",
-                                                          hal::PinOptions<double>{.initial = min});
+        number_in_ =
+            place<hal::In<double>>(o.component, o.write, name.c_str(), "output of the device",
+                                   hal::PinOptions<double>{.unit = field_.record.unit.c_str()});
+        max_limit_ =
+            place<hal::Param<double>>(o.component, (name + "-maxlim").c_str(), "largest value",
+                                      hal::PinOptions<double>{.initial = max});
+        min_limit_ =
+            place<hal::Param<double>>(o.component, (name + "-minlim").c_str(), "smallest value",
+                                      hal::PinOptions<double>{.initial = min});
     }
     void declare_encoder(const PinOwner& o, const std::string& name, bool is_output) {
         if (is_output) return;
-        count_ = std::make_unique<hal::Out<std::int32_t>>(
-            o.component, o.read, (name + ".count").c_str(), "counts since the last reset");
-        raw_count_ = std::make_unique<hal::Out<std::int32_t>>(
+        count_ = place<hal::Out<std::int32_t>>(o.component, o.read, (name + ".count").c_str(),
+                                               "counts since the last reset");
+        raw_count_ = place<hal::Out<std::int32_t>>(
             o.component, o.read, (name + ".rawcounts").c_str(), "counts since the start");
-        position_ = std::make_unique<hal::Out<double>>(
-            o.component, o.read, (name + ".position").c_str(), "position, count / scale");
-        reset_ = std::make_unique<hal::In<bool>>(o.component, o.read, (name + ".reset").c_str(),
-                                                 "TRUE: count and position are 0");
-        scale_ =
-            std::make_unique<ScaleParam>(o.component, (name + ".scale").c_str(), "counts per unit",
-                                         hal::PinOptions<double>{.initial = 1.0});
+        position_ = place<hal::Out<double>>(o.component, o.read, (name + ".position").c_str(),
+                                            "position, count / scale");
+        reset_ = place<hal::In<bool>>(o.component, o.read, (name + ".reset").c_str(),
+                                      "TRUE: count and position are 0");
+        scale_ = place<ScaleParam>(o.component, (name + ".scale").c_str(), "counts per unit",
+                                   hal::PinOptions<double>{.initial = 1.0});
     }
 
     std::uint64_t take(std::span<const std::uint32_t> words) const noexcept {
@@ -183,16 +181,16 @@ private:
     }
 
     const RemoteField field_;
-    std::vector<std::unique_ptr<hal::In<bool>>> bits_in_;
-    std::vector<std::unique_ptr<hal::Param<bool>>> inverts_;
-    std::vector<std::unique_ptr<hal::Out<bool>>> bits_out_, bits_not_;
-    std::unique_ptr<hal::In<double>> number_in_;
-    std::unique_ptr<hal::Out<double>> number_out_;
-    std::unique_ptr<hal::Param<double>> scale_max_, max_limit_, min_limit_;
-    std::unique_ptr<ScaleParam> scale_;
-    std::unique_ptr<hal::Out<std::int32_t>> count_, raw_count_;
-    std::unique_ptr<hal::Out<double>> position_;
-    std::unique_ptr<hal::In<bool>> reset_;
+    std::vector<Placed<hal::In<bool>>> bits_in_;
+    std::vector<Placed<hal::Param<bool>>> inverts_;
+    std::vector<Placed<hal::Out<bool>>> bits_out_, bits_not_;
+    Placed<hal::In<double>> number_in_;
+    Placed<hal::Out<double>> number_out_;
+    Placed<hal::Param<double>> scale_max_, max_limit_, min_limit_;
+    Placed<ScaleParam> scale_;
+    Placed<hal::Out<std::int32_t>> count_, raw_count_;
+    Placed<hal::Out<double>> position_;
+    Placed<hal::In<bool>> reset_;
     PositionCounter<std::int32_t> counter_;
     std::int64_t zero_ = 0;
 };
@@ -215,13 +213,13 @@ public:
             user_[n] = port.of_channel(smart_serial::user + n, remote.channel);
         }
         for (const RemoteField& field : remote.outputs) {
-            outputs_.push_back(std::make_unique<RemoteFieldPins>(o, remote.name(), field, true));
+            outputs_.push_back(place<RemoteFieldPins>(o, remote.name(), field, true));
         }
         for (const RemoteField& field : remote.inputs) {
-            inputs_.push_back(std::make_unique<RemoteFieldPins>(o, remote.name(), field, false));
+            inputs_.push_back(place<RemoteFieldPins>(o, remote.name(), field, false));
         }
         for (const RemoteConstant& constant : remote.constants) {
-            constants_.push_back(std::make_unique<hal::Param<std::uint32_t>>(
+            constants_.push_back(place<hal::Param<std::uint32_t>>(
                 o.component, (remote.name() + "." + constant.name).c_str(),
                 "read from the device at the start",
                 hal::PinOptions<std::uint32_t>{.initial = constant.value}));
@@ -275,8 +273,8 @@ private:
     const std::uint16_t status_;
     std::array<std::uint16_t, max_words> user_{};
     std::array<std::size_t, max_words> offsets_{};
-    std::vector<std::unique_ptr<RemoteFieldPins>> outputs_, inputs_;
-    std::vector<std::unique_ptr<hal::Param<std::uint32_t>>> constants_;
+    std::vector<Placed<RemoteFieldPins>> outputs_, inputs_;
+    std::vector<Placed<hal::Param<std::uint32_t>>> constants_;
     unsigned missing_ = 0;
     hal::Out<bool> online_;
 };
@@ -307,7 +305,7 @@ public:
           fault_lim_(o.component, named(port, "fault-lim").c_str(),
                      "fault-count at which the port is started again", {.initial = 200}) {
         for (const Remote& remote : port.remotes) {
-            remotes_.push_back(std::make_unique<RemotePins>(o, port, remote, number++));
+            remotes_.push_back(place<RemotePins>(o, port, remote, number++));
         }
     }
 
@@ -387,7 +385,7 @@ public:
             remote->show_offline();
         }
     }
-    const std::vector<std::unique_ptr<RemotePins>>& remotes() const noexcept { return remotes_; }
+    const std::vector<Placed<RemotePins>>& remotes() const noexcept { return remotes_; }
     /// Returns whether devices answer or have had the time to.
     bool is_running() const noexcept { return phase_ == Phase::running && exchanges_ > 20; }
 
@@ -446,7 +444,7 @@ private:
     bool is_first_ = true;  ///< no answers since the start
     unsigned exchanges_ = 0;  ///< since the start
     std::uint32_t faults_ = 0;
-    std::vector<std::unique_ptr<RemotePins>> remotes_;
+    std::vector<Placed<RemotePins>> remotes_;
     hal::In<bool> run_;
     hal::Out<std::uint32_t> state_, state_2_, state_3_, fault_count_, restarts_;
     hal::Param<std::uint32_t> fault_inc_, fault_dec_, fault_lim_;
@@ -457,7 +455,7 @@ public:
     SerialPins(const PinOwner& o, const std::vector<RemotePort>& ports) {
         std::uint32_t number = 0;
         for (const RemotePort& port : ports) {
-            ports_.push_back(std::make_unique<SerialPortPins>(o, port, number));
+            ports_.push_back(place<SerialPortPins>(o, port, number));
         }
     }
     void plan(ReadLayout& layout) override {
@@ -493,10 +491,10 @@ public:
         }
         return size;
     }
-    const std::vector<std::unique_ptr<SerialPortPins>>& ports() const noexcept { return ports_; }
+    const std::vector<Placed<SerialPortPins>>& ports() const noexcept { return ports_; }
 
 private:
-    std::vector<std::unique_ptr<SerialPortPins>> ports_;
+    std::vector<Placed<SerialPortPins>> ports_;
 };
 
 }  // namespace hal::mesa

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -149,12 +148,12 @@ public:
                          "rate register: steps/s x 2^32 / clock") {
         const std::uint8_t version = module.descriptor.version;
         if (version == stepgen::version_with_latch) {
-            latch_ = std::make_unique<StepgenLatch>(o, unit);
+            latch_ = place<StepgenLatch>(o, unit);
         }
         if (version == stepgen::version_with_latch || version == stepgen::version_with_swap) {
-            swap_step_dir_ = std::make_unique<hal::Param<bool>>(
-                o.component, named(unit, "swap_step_dir"),
-                "TRUE: the pins of step and direction are exchanged");
+            swap_step_dir_ =
+                place<hal::Param<bool>>(o.component, named(unit, "swap_step_dir"),
+                                        "TRUE: the pins of step and direction are exchanged");
         }
         // one at a time: a name lasts until the next one
         hal::Retained(o.component, {{named(unit, "counter"), counter_}});
@@ -384,8 +383,8 @@ private:
     ScaleParam position_scale_;
     hal::OptionalLimitParam maxvel_, maxaccel_;
     hal::Param<std::uint32_t> steplen_, stepspace_, dirsetup_, dirhold_, step_type_;
-    std::unique_ptr<hal::Param<bool>> swap_step_dir_;  ///< of firmware that can
-    std::unique_ptr<StepgenLatch> latch_;  ///< the same
+    Placed<hal::Param<bool>> swap_step_dir_;  ///< of firmware that can
+    Placed<StepgenLatch> latch_;  ///< the same
     hal::Out<double> dbg_pos_minus_prev_cmd_, dbg_ff_vel_, dbg_vel_error_, dbg_s_to_match_,
         dbg_err_at_match_;
     hal::Out<std::int32_t> dbg_step_rate_;
@@ -481,7 +480,7 @@ private:
     const ModuleAddresses addresses_;
     const DpllPins* const dpll_;
     const bool has_latches_;
-    std::vector<std::unique_ptr<Stepgen>> units_;
+    std::vector<Placed<Stepgen>> units_;
     Setting master_rate_;
     std::optional<LatchTimer> timer_;
     std::size_t accumulators_ = 0;

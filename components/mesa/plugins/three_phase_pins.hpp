@@ -2,7 +2,6 @@
 // Three-phase PWM: the six gates of a motor bridge.
 #pragma once
 
-#include <memory>
 #include <vector>
 
 #include "mesa/driver/bridge_enable.hpp"
@@ -112,7 +111,7 @@ private:
     const ModuleAddresses addresses_;
     const std::uint32_t clock_hz_;
     Setting rate_;
-    std::vector<std::unique_ptr<ThreePhaseGenerator>> units_;
+    std::vector<Placed<ThreePhaseGenerator>> units_;
     hal::Param<std::uint32_t> frequency_;
     std::size_t enables_ = 0;
 };

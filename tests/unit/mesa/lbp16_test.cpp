@@ -95,6 +95,24 @@ TEST(Lbp16, Request_that_would_be_too_long_is_unchanged) {
     EXPECT_FALSE(request.write(Space::hostmot2, 0, Unit::u32, {}));
 }
 
+TEST(Lbp16, Appended_request_has_the_commands_of_both) {
+    Request reads;
+    ASSERT_TRUE(reads.read(Space::hostmot2, 0x100, Unit::u32, 2));
+    Request request;
+    ASSERT_TRUE(request.write32(0x2000, 5));
+    EXPECT_TRUE(request.append(reads));
+    EXPECT_EQ(request.size(), 12U);
+    EXPECT_EQ(request.reply_size(), 8U);
+    EXPECT_EQ(hex(request.bytes().last(4)), hex(reads.bytes()));
+    while (request.write32(0x2000, 5)) {
+    }
+    EXPECT_EQ(request.size(), max_datagram - 4);
+    EXPECT_TRUE(request.append(reads));
+    EXPECT_FALSE(request.append(reads));
+    EXPECT_EQ(request.size(), max_datagram);
+    EXPECT_EQ(request.reply_size(), 16U);
+}
+
 TEST(Lbp16, Every_cut_request_is_malformed_at_its_last_command) {
     const auto whole = from_hex("81 C2 00 0E 00 00 00 5A 82 42 00 10");
     for (std::size_t size = 0; size <= whole.size(); ++size) {
