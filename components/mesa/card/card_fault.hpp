@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
 #include <string>
 #include <string_view>
 
@@ -21,11 +22,18 @@ enum class CardFaultKind : std::uint8_t {
     remote_lost,    ///< smart-serial devices do not answer
     bite,           ///< the watchdog bites, once
     reset,          ///< the card loses its power and gets it back, once
+    quadrature_error,  ///< encoders see A and B change at the same time, once
 };
 inline constexpr const char* card_fault_names[] = {
-    "drop-request", "drop-reply",    "delay",       "duplicate", "swap", "wrong-length",
-    "wrong-cookie", "stuck-counter", "remote-lost", "bite",      "reset"};
-inline constexpr std::size_t card_fault_kinds = 11;
+    "drop-request", "drop-reply",    "delay",       "duplicate", "swap",  "wrong-length",
+    "wrong-cookie", "stuck-counter", "remote-lost", "bite",      "reset", "quadrature-error"};
+inline constexpr std::size_t card_fault_kinds = std::size(card_fault_names);
+
+/// Whether a fault is an event, in place of something that lasts. [any]
+constexpr bool happens_once(CardFaultKind kind) noexcept {
+    return kind == CardFaultKind::bite || kind == CardFaultKind::reset ||
+           kind == CardFaultKind::quadrature_error;
+}
 
 struct CardFault {
     CardFaultKind kind = CardFaultKind::drop_request;

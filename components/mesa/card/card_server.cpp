@@ -67,11 +67,14 @@ std::string parse_card_fault(std::string_view text, CardFault& fault) {
 }
 
 void CardServer::strike(CardFaultKind kind) noexcept {
-    if (kind == CardFaultKind::bite) {
-        card_.bite();
-    } else if (kind == CardFaultKind::reset) {
+    switch (kind) {
+    case CardFaultKind::bite: card_.bite(); break;
+    case CardFaultKind::reset:
         card_.reset();
         held_size_ = 0;
+        break;
+    case CardFaultKind::quadrature_error: card_.fail_encoders(); break;
+    default: break;
     }
 }
 
@@ -120,9 +123,8 @@ void CardServer::advance(std::int64_t now_ns) noexcept {
     card_.set_counter_stuck(lasts(CardFaultKind::stuck_counter));
     card_.set_remotes_lost(lasts(CardFaultKind::remote_lost));
     for (CardFault& fault : faults_) {
-        const bool happens_once =
-            fault.kind == CardFaultKind::bite || fault.kind == CardFaultKind::reset;
-        if (!happens_once || fault.is_done || !fault.lasts(newest_ns_ - first_ns_)) continue;
+        if (!happens_once(fault.kind) || fault.is_done) continue;
+        if (!fault.lasts(newest_ns_ - first_ns_)) continue;
         fault.is_done = true;
         strike(fault.kind);
     }

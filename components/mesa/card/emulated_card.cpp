@@ -414,6 +414,12 @@ void EmulatedCard::latch(unsigned timers) noexcept {
     }
 }
 
+void EmulatedCard::fail_encoders() noexcept {
+    for (Counter& counter : counters_) {
+        counter.counter.fail();
+    }
+}
+
 void EmulatedCard::bite() noexcept {
     watchdog_.bite();
     ++bites_;

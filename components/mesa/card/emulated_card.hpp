@@ -41,6 +41,8 @@ public:
 
     /// The watchdog bites.
     void bite() noexcept;
+    /// All encoders see A and B change at the same time.
+    void fail_encoders() noexcept;
     /// The card loses its power and gets it back: all registers are reset, the machine stays.
     void reset() noexcept;
     void set_remotes_lost(bool lost) noexcept { serial_.set_lost(lost); }

@@ -32,6 +32,8 @@ void QuadratureCounter::latch(std::uint16_t count, std::uint32_t arming) noexcep
     }
 }
 
+void QuadratureCounter::fail() noexcept { control_ |= encoder::quadrature_error; }
+
 void QuadratureCounter::set_probe(bool level) noexcept {
     const bool wants_rising = (control_ & encoder::probe_polarity) != 0;
     const bool is_event = level != probe_ && level == wants_rising;

@@ -17,6 +17,8 @@ public:
         std::uint16_t last_edge = 0;   ///< time stamp of the newest edge
     };
     void move(const Motion& motion) noexcept;
+    /// A and B change at the same time: the counter notes it until its control is written.
+    void fail() noexcept;
     /// The level of the probe input; an edge may be latched.
     void set_probe(bool level) noexcept;
 

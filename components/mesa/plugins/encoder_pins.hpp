@@ -50,7 +50,7 @@ public:
           velocity_rpm_(o.component, o.read, named(unit, "velocity-rpm"), "velocity, units/min",
                         {.safe = 0.0}),
           quad_error_(o.component, o.read, named(unit, "quad-error"),
-                      "A and B have changed at the same time"),
+                      "A and B have changed at the same time since quad-error-enable became TRUE"),
           position_valid_(o.component, o.read, named(unit, "position-valid"),
                           "FALSE: counts may be lost, because the card was lost while the encoder "
                           "turned fast, or for longer than 1 s; TRUE again after reset or an index "
@@ -63,7 +63,7 @@ public:
           no_clear_on_index_(o.component, o.read, named(unit, "no_clear_on_index"),
                              "TRUE: the index is latched, and the count goes on"),
           quad_error_enable_(o.component, o.read, named(unit, "quad-error-enable"),
-                             "TRUE: quad-error is shown"),
+                             "TRUE: quad-error is shown; a rising edge clears an earlier error"),
           index_enable_(o.component, named(unit, "index-enable"),
                         "TRUE: the next index makes the count 0 and this FALSE"),
           scale_(o.component, named(unit, "scale"), "counts per unit"),
@@ -110,6 +110,7 @@ public:
             speed_.update({counter_.position() - before, edge_ticks, now_ticks}, ticks_hz,
                           vel_timeout_);
         }
+        has_old_error_ = has_old_error_ && !(is_clearing_ && reading.writes_arrived);
         read_control(control);
         follow_latch(value, static_cast<std::int16_t>(control >> 16));
         show();
@@ -118,6 +119,7 @@ public:
     bool take_loss() noexcept { return std::exchange(may_have_lost_, false); }
     /// [realtime] write
     void transmit(Outgoing& out, const Writing&) noexcept {
+        is_clearing_ = false;
         if (!is_read_) return;  // what is to be written depends on what is there
         is_read_ = false;
         const LatchSource source = wanted_source();
@@ -130,11 +132,12 @@ public:
         // after an event, and for another source, the bits are cleared before they are set again
         const bool stays = is_armed && !is_done_ && source == source_;
         const bool arms = source != LatchSource::none && !is_armed;
-        if (stays || (!arms && !is_armed && !differs)) return;
+        if (stays || (!arms && !is_armed && !differs && !has_old_error_)) return;
         if (arms) {
             source_ = source;
         }
         out.put(control_address_, arms ? settings | arming_bits(source) : settings);
+        is_clearing_ = out.is_complete();  // each write clears an error
     }
 
 private:
@@ -193,7 +196,14 @@ private:
         input_a_ = (control & encoder::input_a) != 0;
         input_b_ = (control & encoder::input_b) != 0;
         input_index_ = (control & encoder::input_index) != 0;
-        quad_error_ = quad_error_enable_ && (control & encoder::quadrature_error) != 0;
+        show_error((control & encoder::quadrature_error) != 0);
+    }
+    /// An error from before quad-error-enable is not shown: it is cleared in the card, once no latch
+    /// is armed.
+    void show_error(bool is_set) noexcept {
+        const bool was_enabled = std::exchange(shows_error_, quad_error_enable_);
+        has_old_error_ = shows_error_ && is_set && (has_old_error_ || !was_enabled);
+        quad_error_ = shows_error_ && is_set && !has_old_error_;
     }
     void follow_latch(std::int16_t value, std::int16_t latch) noexcept {
         constexpr std::uint32_t armed_bits = encoder::latch_on_index | encoder::latch_on_probe;
@@ -249,6 +259,9 @@ private:
     bool may_have_lost_ = false;
     bool is_uncertain_ = false;  ///< until the count has a new zero
     bool is_done_ = false;  ///< the event that the register shows has been handled
+    bool shows_error_ = false;  ///< as quad-error-enable was at the newest answer
+    bool has_old_error_ = false;  ///< the register has an error from before that
+    bool is_clearing_ = false;  ///< the newest datagram writes the register
     LatchSource source_ = LatchSource::none;  ///< what the register arms
 
     hal::Out<std::int32_t> count_, rawcounts_, rawlatch_, count_latched_;

@@ -105,6 +105,8 @@ struct MesaCard : hal::Component {
     hal::In<bool> remote_lost_{*this, "remote-lost", "smart-serial devices do not answer"};
     hal::In<bool> bite_{*this, "bite", "rising edge: the watchdog bites"};
     hal::In<bool> reset_{*this, "reset", "rising edge: the card loses its power and gets it back"};
+    hal::In<bool> quadrature_error_{*this, "quadrature-error",
+                                    "rising edge: encoders see A and B change at the same time"};
     hal::In<double> loss_{*this, "loss", "share of the datagrams that are lost at random, 0..1"};
     hal::Out<std::uint64_t> requests_{*this, "requests", "requests that the card has executed"};
     hal::Out<std::uint64_t> lost_{*this, "lost", "requests and replies that were lost"};
@@ -124,8 +126,10 @@ struct MesaCard : hal::Component {
         now_ns_ = cycle.start_ns();
         const bool bites = bite_edge_.rises(bite_);
         const bool resets = reset_edge_.rises(reset_);
+        const bool fails = quadrature_edge_.rises(quadrature_error_);
         must_bite_ = must_bite_ || bites;
         must_reset_ = must_reset_ || resets;
+        must_fail_ = must_fail_ || fails;
         attachment_->exclusively([](void* self) { static_cast<MesaCard*>(self)->work(); }, this);
     }
 
@@ -197,6 +201,9 @@ private:
         if (std::exchange(must_reset_, false)) {
             server_->strike(CardFaultKind::reset);
         }
+        if (std::exchange(must_fail_, false)) {
+            server_->strike(CardFaultKind::quadrature_error);
+        }
         machine_->show(*card_);
         requests_ = card_->requests();
         lost_ = server_->lost();
@@ -210,8 +217,8 @@ private:
     std::unique_ptr<EmulatedCard> card_;
     std::unique_ptr<CardServer> server_;
     std::unique_ptr<hal::datagram::Attachment> attachment_;
-    hal::RisingEdge bite_edge_, reset_edge_;
-    bool must_bite_ = false, must_reset_ = false;
+    hal::RisingEdge bite_edge_, reset_edge_, quadrature_edge_;
+    bool must_bite_ = false, must_reset_ = false, must_fail_ = false;
     std::int64_t now_ns_ = 0;
 };
 
@@ -258,7 +265,7 @@ Pins of the machine have the names of its parts: `x.position`, `x-home`, `spindl
 are outputs of the module, so that a bite of the watchdog stops it, as a real one.
 
 The faults of a card and of the network are pins: `loss`, `drop-request`, `drop-reply`, `delay`, `duplicate`, `swap`, `wrong-length`, `wrong-cookie`,
-`stuck-counter`, `remote-lost`, `bite`, `reset`.
+`stuck-counter`, `remote-lost`, `bite`, `reset`, `quadrature-error`.
 
 As a process with an IP address, it is `hal node mesa FILE`.
 )")
