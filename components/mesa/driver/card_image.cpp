@@ -294,6 +294,15 @@ std::uint32_t CardImage::serial_channels(const ConfigString& config, unsigned po
     return present;
 }
 
+void CardImage::release_channels(unsigned port, std::uint32_t devices) noexcept {
+    for (CardPin& pin : pins) {
+        const PinDescriptor& d = pin.descriptor;
+        if (!is_serial(d.module) || d.unit != port) continue;
+        const bool has_device = (devices >> serial_channel(d) & 1U) != 0;
+        pin.is_gpio = pin.is_gpio || !has_device;
+    }
+}
+
 CardImage probe(SetupLink& link) {
     CardImage image;
     image.address = link.address();

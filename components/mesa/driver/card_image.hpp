@@ -43,6 +43,9 @@ struct CardImage {
     CardModule* find(Tag tag) noexcept;
     /// Returns the used channels of a smart-serial port, a bit each.
     std::uint32_t serial_channels(const ConfigString& config, unsigned port) const noexcept;
+    /// Makes the pins of the channels of a smart-serial port GPIO, except those with a device:
+    /// `devices` has a bit for each.
+    void release_channels(unsigned port, std::uint32_t devices) noexcept;
 };
 
 /// Reads what a card has. It only reads. Throws CardError when there is no answer, when the

@@ -2,6 +2,7 @@
 // The load arguments of an instance, and the card that they name.
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <string>
 #include <vector>
@@ -119,9 +120,17 @@ private:
             if (has_serial()) {
                 check_alone(link);
                 remote_ports_ = discover_remotes(link, image_, config_);
+                release_channels();
             }
         } catch (const CardError& e) {
             throw hal::ArgumentError(names.board, e.what());
+        }
+    }
+    /// As in LinuxCNC's driver.
+    void release_channels() {
+        for (unsigned port = 0; port < ConfigString::max_ports; ++port) {
+            const auto found = std::ranges::find(remote_ports_, port, &RemotePort::port);
+            image_.release_channels(port, found == remote_ports_.end() ? 0 : found->mask());
         }
     }
     bool has_serial() const {
