@@ -309,6 +309,21 @@ class FrameGuardian(GuardedMachine, Case):
         )
         self.assertIn("guard: another guardian has taken over", errors)
 
+    def test_a_machine_that_ends_without_a_guardian_reports_what_was_not_sent(self):
+        self.add_pair()
+        self.addCleanup(self.remove_pair)
+        self.write("guard.hal", NETLIST.replace("eth:lo", "eth:pair0"))
+        machine = self.run_guarded()
+        self.remove_pair()
+        self.kill_guardian(machine)
+        printed = self.printed_until(machine, "guard: no other guardian can be started")
+        errors = printed + self.end(machine)[1]
+        self.assertIn(
+            "guard: not all stop frames were sent on eth:pair0 in time (handed to the driver 0 times: "
+            "not as often as declared); stop the drives by other means\n",
+            errors,
+        )
+
     def test_a_thread_that_fails_before_it_comes_to_the_function_sends_them_again(self):
         self.environment["HALCYON_PLUGIN_PATH"] = str(Path(PLUGINS).parent / "plugins")
         self.write("fails.hal", FAILS)
@@ -388,6 +403,14 @@ class FrameGuardian(GuardedMachine, Case):
             "a stop frame has 115 bytes, and eth:lo sends at most 114; write a shorter one, or raise "
             "the MTU of the interface",
             self.bad("run", "long.hal"),
+        )
+
+    def test_a_node_of_the_same_process_is_rejected(self):
+        self.write("node.hal", 'loadrt frame_guardian link=scocan:motor send="201#0000"\n')
+        self.assertIn(
+            "link: 'scocan:motor' is a node of this process, and the guardian is another one; "
+            "write the address of the bus",
+            self.bad("check", "node.hal"),
         )
 
     def test_an_interface_that_does_not_exist(self):

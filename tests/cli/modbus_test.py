@@ -62,6 +62,17 @@ class Modbus(Case):
         node.terminate()
         node.wait(timeout=TIMEOUT)
 
+    def test_a_line_that_is_closed(self):
+        with socket.create_server(("127.0.0.1", 0)) as server:
+            line = f"tcp:127.0.0.1:{server.getsockname()[1]}"
+            closer = threading.Thread(target=lambda: server.accept()[0].close())
+            closer.start()
+            self.assertEqual(
+                f"hal modbus read: {line} is lost or does not accept the request\n",
+                self.bad("modbus", "read", line, "1", "holding", "0"),
+            )
+            closer.join()
+
     def test_check_and_plan(self):
         self.assertEqual(
             "bus.modbus: 2 slaves, 7 values, 6 telegrams\n",

@@ -158,7 +158,13 @@ private:
             return "cannot start the guardian '" + arguments[0] + "': " + link::reason(error);
         }
         process_ = link::Descriptor(static_cast<int>(syscall(SYS_pidfd_open, pid_, 0)));
-        if (!process_) return "cannot watch the guardian: " + link::reason();
+        if (!process_) {
+            const std::string problem = "cannot watch the guardian: " + link::reason();
+            ::kill(pid_, SIGKILL);
+            waitpid(pid_, nullptr, 0);
+            pid_ = -1;
+            return problem;
+        }
         return {};
     }
 

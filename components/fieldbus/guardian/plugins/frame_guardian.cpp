@@ -61,6 +61,7 @@ struct FrameGuardian : hal::Component {
         problem = parse(frames_.get(), confirmations_.get(), parsed_ = {});
         if (!problem.empty()) throw hal::ArgumentError("confirm", "confirm: " + problem);
         check_duration();
+        check_link();
     }
 
     void start() {
@@ -154,6 +155,13 @@ private:
                 " takes " + std::to_string(duration_ms) + " ms, and a stop takes at most " +
                 std::to_string(max_ms) + " ms; write repeat=" + std::to_string(max_ms / every_ms_) +
                 ", or a shorter every_ms=");
+    }
+
+    void check_link() const {
+        if (!link_.get().starts_with("scocan:")) return;
+        throw hal::ArgumentError("link", "link: '" + link_.get() +
+                                             "' is a node of this process, and the guardian is "
+                                             "another one; write the address of the bus");
     }
 
     bool is_in_memory() const {
