@@ -63,6 +63,16 @@ time.sleep(60)
 """
 
 
+# a thread above that of a guardian, on its CPU, that never sleeps
+OCCUPANT = """import os, sys, time
+os.sched_setaffinity(0, {int(sys.argv[1])})
+end = time.monotonic() + 20
+print("busy", flush=True)
+while time.monotonic() < end:
+    pass
+"""
+
+
 class Listener:
     """The payloads of the frames of this test, with the time of each."""
 
@@ -257,6 +267,26 @@ class FrameGuardian(GuardedMachine, Case):
             "guard: the guardian has stalled for 1.5 s and is killed; another one is started\n",
             errors,
         )
+
+    def test_a_guardian_that_gets_no_cpu_time_sends_them(self):
+        if subprocess.run(["chrt", "--fifo", "50", "true"], capture_output=True).returncode != 0:
+            self.skipTest("no permission for real-time priorities")
+        machine = self.run_guarded()
+        cpu = max(os.sched_getaffinity(0))
+        for thread in os.listdir(f"/proc/{self.guardian_of(machine)}/task"):
+            os.sched_setaffinity(int(thread), {cpu})
+        command = ["chrt", "--fifo", "50", sys.executable, "-c", OCCUPANT, str(cpu)]
+        occupant = subprocess.Popen(command, stdout=subprocess.PIPE)
+        self.addCleanup(occupant.stdout.close)
+        self.addCleanup(occupant.wait)
+        self.addCleanup(occupant.kill)
+        self.assertEqual(b"busy\n", occupant.stdout.readline())
+        since = time.monotonic()
+        machine.kill()
+        self.stops(since)
+        self.assertIsNone(occupant.poll(), "the CPU was free")
+        occupant.kill()
+        self.end(machine, signal.SIGKILL)
 
     def test_a_short_e_stop_is_counted(self):
         machine = self.run_guarded()

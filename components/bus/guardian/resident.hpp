@@ -18,6 +18,7 @@
 #include <string>
 
 #include "bus/guardian/child_process.hpp"
+#include "bus/guardian/starvation_watch.hpp"
 #include "link/system.hpp"
 
 namespace hal::bus {
@@ -34,7 +35,7 @@ inline void ignore_signals() {
 /// [setup]
 inline void be_resident() {
     mlockall(MCL_CURRENT | MCL_FUTURE);
-    const sched_param priority{.sched_priority = 10};
+    const sched_param priority{.sched_priority = guardian_priority};
     if (sched_setscheduler(0, SCHED_FIFO | SCHED_RESET_ON_FORK, &priority) != 0) {
         setpriority(PRIO_PROCESS, 0, -10);
     }

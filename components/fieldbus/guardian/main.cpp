@@ -49,6 +49,7 @@ public:
             const std::int64_t next = transmitter_.work(now);
             follow(now);
             memory_.turns.fetch_add(1, std::memory_order_relaxed);
+            starvation_.turn();
             wait(next - now);
         }
         return 0;
@@ -197,6 +198,7 @@ private:
     GuardianMemory& memory_;
     StopTransmitter& transmitter_;
     bus::ParentWatch parent_;
+    bus::StarvationWatch starvation_;
     const StopRecord previous_;  // of a guardian that was killed
     Phase phase_ = Phase::watching;
     StopReason reason_;

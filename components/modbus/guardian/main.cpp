@@ -53,6 +53,7 @@ public:
             const std::int64_t now = link::monotonic_ns();
             watch(now);
             image_.header().turns.fetch_add(1, std::memory_order_relaxed);
+            starvation_.turn();
             // read before work(), which then follows the stop that was requested before
             const bool is_ending = image_.header().requests.is_ending();
             const std::int64_t next = master_.work(now);
@@ -143,6 +144,7 @@ private:
     Image image_;
     line::Line& line_;
     bus::ParentWatch parent_;
+    bus::StarvationWatch starvation_;
     Master master_;
     StopReason reason_ = StopReason::none;
     std::int64_t begun_at_ = 0;
