@@ -3,7 +3,7 @@
 // request is under way at a time; of those that wait, only the newest is sent.
 import {on, request, state} from './link.js';
 import {announce, h, text} from './dom.js';
-import {Moves, percent, timeText} from './timeline_moves.js';
+import {Moves, noteText, percent, timeText} from './timeline_moves.js';
 
 const pageStep = 1e9;  // ns, of Page Up and Page Down
 const kinds = {
@@ -223,22 +223,9 @@ export class TimeLine {
         this.draw();
     }
 
-    /// Why the last move was not made, what is missing of the journal, and how long going back
-    /// takes without keyframes.
     drawNote() {
-        const {past} = state, parts = [];
-        if (this.problem) parts.push(this.problem);
-        const moment = past?.moment;
-        if (moment?.moving) parts.push(`executing the journal: ${timeText(moment.time_ns)}`);
-        const why = moment?.state?.trim() ?? '';
-        if (why && why !== 'interrupted') parts.push(why);
-        if (moment && moment.copied === false && moment.took_ms !== undefined)
-            parts.push(
-                'without keyframes: going back executes the journal from its begin; the last ' +
-                `move took ${(moment.took_ms / 1000).toFixed(2)} s`);
-        if (moment?.left_out > 0) parts.push(`${moment.left_out} further marks are not shown`);
-        parts.push(...past?.timeline?.notes ?? []);
-        text(this.note, parts.join('; '));
+        const {past} = state;
+        text(this.note, noteText(this.problem, past?.moment, past?.timeline?.notes));
         this.note.classList.toggle('bad', Boolean(this.problem));
     }
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The moves of a time line that wait for the one that is under way, and texts of its times.
+// The moves of a time line that wait for the one that is under way, and its texts.
 
 /// A time of the journal with as many digits as its cycles need.
 export const timeText = ns => `${(ns / 1e9).toFixed(6)} s`;
@@ -7,6 +7,26 @@ export const timeText = ns => `${(ns / 1e9).toFixed(6)} s`;
 /// Where a time is, in percent of the whole journal.
 export const percent = (ns, end_ns) =>
     end_ns > 0 ? Math.min(100, Math.max(0, 100 * ns / end_ns)) : 0;
+
+/**
+ * The line below the time line: why the last move was not made, where the execution is, how long
+ * going back takes without keyframes, and what is missing of the journal.
+ */
+export function noteText(problem, moment, notes = []) {
+    const parts = [];
+    if (problem) parts.push(problem);
+    if (moment?.moving) parts.push(`executing the journal: ${timeText(moment.time_ns)}`);
+    const why = moment?.state?.trim() ?? '';
+    if (why && why !== 'interrupted') parts.push(why);
+    if (moment?.copied === false && moment.took_ms !== undefined)
+        parts.push(
+            'without keyframes: going back executes the journal from its begin; the last ' +
+            `move took ${(moment.took_ms / 1000).toFixed(2)} s`);
+    const left_out = moment?.left_out ?? 0;
+    if (left_out === 1) parts.push('1 further mark is not shown');
+    if (left_out > 1) parts.push(`${left_out} further marks are not shown`);
+    return [...parts, ...notes].join('; ');
+}
 
 /**
  * Puts moves together while one is under way: of several times the newest counts, and steps add up.
