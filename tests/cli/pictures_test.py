@@ -18,6 +18,7 @@ SCRIPTS = {  # what each of them writes
     "canopen-robot/picture": ("match.svg",),
     "furuta/picture": ("swing-up.svg",),
     "jitter/experiment": ("jitter.csv", "jitter-overshoot.svg", "jitter-responses.svg"),
+    "linuxcnc-ethernet/picture": ("path.png",),
     "yair/picture": ("path.svg",),
 }
 # Started by `hal linuxcnc`, in LinuxCNC's Python, or by another script.
@@ -123,6 +124,37 @@ class Pictures(Case):
                     (1, f"{alone}/drawing.py is missing; copy the whole folder halfiles\n"),
                     (done.returncode, done.stderr),
                 )
+
+    def test_a_run_with_missed_cycles_is_not_drawn(self):
+        """With a `hal` that misses 2, 1 and 0 cycles, and with one that misses some in each run."""
+        hal = self.folder / "hal"
+        hal.write_text(f"""#!/bin/sh
+cd {self.folder}
+echo >> runs
+missed=$((3 - $(wc -l < runs)))
+echo "program.ngc took 1 s; of 1000 cycles of the servo thread $missed were missed"
+echo "$missed" > "$PATH_FOLDER/path.png"
+""")
+        hal.chmod(0o755)
+        made = self.folder / "path.png"
+        done = self.run_script("linuxcnc-ethernet/picture", made, hal=hal)
+        self.assertEqual((0, ""), (done.returncode, done.stderr))
+        self.assertEqual("0\n", made.read_text())
+        self.assertEqual(
+            "again: missed cycles of the servo thread: 2\n"
+            "again: missed cycles of the servo thread: 1\n"
+            "no cycle of the servo thread was missed\n",
+            done.stdout,
+        )
+        made.unlink()
+        hal.write_text(hal.read_text().replace("((3", "((100"))
+        done = self.run_script("linuxcnc-ethernet/picture", made, hal=hal)
+        self.assertEqual(
+            f"{made} is not written: each of 20 runs missed cycles; repeat it while nothing else runs\n",
+            done.stderr,
+        )
+        self.assertEqual(1, done.returncode)
+        self.assertFalse(made.exists())
 
     def test_path_of_yair(self):
         made = Path(self.folder, "path.svg")
