@@ -19,6 +19,7 @@
 #include <unwind.h>
 #include <utility>
 
+#include "base/region.hpp"
 #include "execute/core.hpp"
 #include "machine/load/component_memory.hpp"
 #include "machine/load/setup_call.hpp"
@@ -427,6 +428,7 @@ void* allocated(std::size_t bytes, std::size_t alignment, void* from, Allocate a
         const std::size_t size = std::max<std::size_t>(bytes, 1);
         if (void* const memory = all->allocate(size, alignment, from)) return memory;
     }
+    if (void* const memory = hal::region::allocate(bytes, alignment)) return memory;
     for (;;) {
         if (void* const memory = allocate()) return memory;
         const std::new_handler handler = std::get_new_handler();
@@ -435,8 +437,11 @@ void* allocated(std::size_t bytes, std::size_t alignment, void* from, Allocate a
     }
 }
 
-void release(void* memory) noexcept {
-    if (hal::component_heap::has(reinterpret_cast<std::uint64_t>(memory))) {
+/// `bytes`: 0 where they are unknown.
+void release(void* memory, std::size_t bytes) noexcept {
+    if (hal::region::has(memory)) {
+        hal::region::release(memory, bytes);
+    } else if (hal::component_heap::has(reinterpret_cast<std::uint64_t>(memory))) {
         hal::heap.load(std::memory_order_acquire)->release(memory);
     } else {
         std::free(memory);
@@ -460,11 +465,13 @@ void release(void* memory) noexcept {
                      [=] { return std::aligned_alloc(boundary, whole); });
 }
 
-[[gnu::weak]] void operator delete(void* memory) noexcept { release(memory); }
-[[gnu::weak]] void operator delete(void* memory, std::size_t) noexcept { release(memory); }
-[[gnu::weak]] void operator delete(void* memory, std::align_val_t) noexcept { release(memory); }
+[[gnu::weak]] void operator delete(void* memory) noexcept { release(memory, 0); }
+[[gnu::weak]] void operator delete(void* memory, std::size_t bytes) noexcept {
+    release(memory, bytes);
+}
+[[gnu::weak]] void operator delete(void* memory, std::align_val_t) noexcept { release(memory, 0); }
 [[gnu::weak]] void operator delete(void* memory, std::size_t, std::align_val_t) noexcept {
-    release(memory);
+    release(memory, 0);
 }
 
 #endif

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "base/region.hpp"
 #include "cli/no_output.hpp"
 #include "commands/files.hpp"
 #include "link/bus_key.hpp"
@@ -26,6 +27,7 @@ bool is_file(const std::string& path) {
 
 CheckedNetlist::CheckedNetlist(NetlistRoot root)
     : root_(std::move(root)), directory_(folder_of(root_.path)) {
+    const region::Scope memory;
     EditorTexts::Recorder recorder;
     ++load_number;
     load();

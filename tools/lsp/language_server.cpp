@@ -147,7 +147,8 @@ void LanguageServer::notify(const char* method, Json params) {
 }
 
 int LanguageServer::idle_ms() const {
-    if (unpublished_ || workspace_.has_work()) return 0;
+    const bool has_work = unpublished_ || workspace_.has_work() || workspace_.has_garbage();
+    if (has_work) return 0;
     return can_refresh_hints_ && features_.has_hints() ? refresh_ms : -1;
 }
 
@@ -155,6 +156,8 @@ void LanguageServer::work() {
     if (unpublished_ || workspace_.has_work()) {
         workspace_.work();
         publish();
+    } else if (workspace_.has_garbage()) {
+        workspace_.free_garbage();
     } else {
         refresh_hints();
     }

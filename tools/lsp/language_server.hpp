@@ -30,7 +30,7 @@ public:
 
     /// Takes the body of a message, whatever it contains.
     void handle(std::string_view body);
-    /// Loads one netlist that has changed and publishes its diagnostics.
+    /// Loads one netlist that has changed and publishes its diagnostics, or frees what was replaced.
     void work();
     /// How long to wait for messages before work() has something to do; -1: for ever.
     int idle_ms() const;

@@ -6,6 +6,7 @@
 #include <csignal>
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <malloc.h>
 #include <poll.h>
 #include <unistd.h>
 
@@ -66,6 +67,13 @@ private:
     int descriptor_;
 };
 
+/// The next netlist is as large as the one that is freed: memory that goes back to the kernel is
+/// requested from it again, and cleared, with each keystroke.
+void keep_freed_memory() {
+    ::mallopt(M_MMAP_THRESHOLD, 32 << 20);
+    ::mallopt(M_TRIM_THRESHOLD, 512 << 20);
+}
+
 }  // namespace
 
 int run_lsp(const LspOptions& options) {
@@ -74,6 +82,7 @@ int run_lsp(const LspOptions& options) {
                     fmt::format("unexpected argument '{}'; see: hal help lsp", options.words[0]));
     }
     ::signal(SIGPIPE, SIG_IGN);
+    keep_freed_memory();
     const MessageOutput output;
     MessageInput input;
     bool connected = true;

@@ -35,11 +35,11 @@ TextDocument::TextDocument(std::string text) : text_(std::move(text)) { find_lin
 
 void TextDocument::find_lines() {
     line_starts_.assign(1, 0);
-    for (auto at = text_.find_first_of("\r\n"); at != text_.npos;
-         at = text_.find_first_of("\r\n", at)) {
+    for (std::size_t at = 0; at < text_.size(); ++at) {
+        if (text_[at] != '\n' && text_[at] != '\r') continue;
         const bool pair = text_[at] == '\r' && at + 1 < text_.size() && text_[at + 1] == '\n';
-        at += pair ? 2 : 1;
-        line_starts_.push_back(at);
+        at += pair ? 1 : 0;
+        line_starts_.push_back(at + 1);
     }
 }
 

@@ -55,6 +55,10 @@ public:
     bool has_work() const;
     /// Loads one such netlist.
     void work();
+    /// True while there are netlists that nothing uses any more.
+    bool has_garbage() const { return !garbage_.empty(); }
+    /// Frees them, which takes a good part of the time of a load.
+    void free_garbage() { garbage_.clear(); }
     /// Returns the diagnostics of all netlists by path. Each open document has an entry.
     std::map<std::string, std::vector<FileDiagnostic>> diagnostics() const;
 
@@ -84,6 +88,7 @@ private:
     std::map<std::string, NetlistRoot> static_roots_;  // by path: of find_root()
     std::map<std::string, NetlistRoot> roots_;  // by path
     std::map<NetlistRoot, Netlist> netlists_;
+    std::vector<std::unique_ptr<CheckedNetlist>> garbage_;
     std::string ini_;
     std::vector<std::string> assumed_;
     std::string last_changed_;
