@@ -11,6 +11,15 @@
 #include "text/quoting.hpp"
 
 namespace hal {
+namespace {
+
+void prefetch(const Model& model, const std::vector<std::unique_ptr<Pin>>& pins) {
+    for (const auto& pin : pins) {
+        model.pin.prefetch(pin->name);
+    }
+}
+
+}  // namespace
 
 bool Edit::name_free(std::string_view name, Span at, const char* what) {
     if (model_.find_pin(name)) {
@@ -123,6 +132,10 @@ bool Edit::add_instance(LoadedComponent& component, std::unique_ptr<Instance>& o
 
 bool Edit::names_free(const Instance& of, const std::vector<std::unique_ptr<Pin>>& pins,
                       const std::vector<std::unique_ptr<LoadedFunction>>& functions) {
+    prefetch(model_, pins);
+    for (const auto& function : functions) {
+        prefetch(model_, function->pins);
+    }
     for (const auto& pin : pins) {
         if (!name_free(pin->name, of.loaded, "its pin") ||
             (!pin->alias.empty() &&

@@ -2,6 +2,8 @@
 #include "model/model.hpp"
 
 #include <algorithm>
+#include <functional>
+#include <string_view>
 #include <unordered_set>
 
 #include "text/natural_order.hpp"
@@ -18,8 +20,19 @@ std::vector<const T*> sorted(std::vector<const T*> all) {
 
 }  // namespace
 
+namespace {
+
+struct TextHash {
+    using is_transparent = void;
+    std::size_t operator()(std::string_view text) const {
+        return std::hash<std::string_view>{}(text);
+    }
+};
+
+}  // namespace
+
 struct Model::Texts {
-    std::unordered_set<std::string> all;
+    std::unordered_set<std::string, TextHash, std::equal_to<>> all;
 };
 
 Pin* Model::find_pin(std::string_view name) const { return pin.find(name); }
@@ -89,6 +102,8 @@ const char* Model::keep(std::string_view text) {
     if (!texts_) {
         texts_ = std::make_shared<Texts>();
     }
+    const auto known = texts_->all.find(text);
+    if (known != texts_->all.end()) return known->c_str();
     return texts_->all.emplace(text).first->c_str();
 }
 

@@ -38,14 +38,15 @@ public:
     /// Enters an object, unless the name is in the table. Throws std::bad_alloc, and then changes
     /// nothing.
     void emplace(std::string_view name, T* object) {
-        if (slot_of(name)) return;
+        const std::uint32_t hash = hash_of(name);
+        if (slot_of(name, hash)) return;
         if ((used_ + 1) * 4 > slots_.size() * 3) {
             // few of them may be in use, the others erased
             resize((size_ + 1) * 2);
         }
-        Slot& slot = free_slot(hash_of(name));
+        Slot& slot = free_slot(hash);
         used_ += slot.is_erased() ? 0 : 1;
-        slot = {name.data(), static_cast<std::uint32_t>(name.size()), hash_of(name), object};
+        slot = {name.data(), static_cast<std::uint32_t>(name.size()), hash, object};
         ++size_;
     }
     /// Removes a name, if it is in the table.
@@ -53,6 +54,12 @@ public:
         if (const Slot* const slot = slot_of(name)) {
             slots_[static_cast<std::size_t>(slot - slots_.data())] = Slot::erased();
             --size_;
+        }
+    }
+    /// Begins to load the slot of a name into the cache: of many names, the misses overlap.
+    void prefetch(std::string_view name) const {
+        if (!slots_.empty()) {
+            __builtin_prefetch(&slots_[hash_of(name) & (slots_.size() - 1)]);
         }
     }
     /// Makes emplace() not allocate until there are so many names.
@@ -120,8 +127,11 @@ private:
     }
 
     const Slot* slot_of(std::string_view name) const {
+        return slots_.empty() ? nullptr : slot_of(name, hash_of(name));
+    }
+
+    const Slot* slot_of(std::string_view name, std::uint32_t hash) const {
         if (slots_.empty()) return nullptr;
-        const std::uint32_t hash = hash_of(name);
         const std::size_t mask = slots_.size() - 1;
         for (std::size_t at = hash & mask; !slots_[at].is_empty(); at = (at + 1) & mask) {
             const Slot& slot = slots_[at];

@@ -401,7 +401,7 @@ std::vector<Command> expand(const Command& command, Diagnostics& diagnostics) {
                        std::none_of(command.args.begin(), command.args.end(),
                                     [](const Token& t) { return has_range(t.text); });
     if (plain) {
-        return {command};
+        return std::vector<Command>(1, command);  // a list would be copied again
     }
     return Expander(command, diagnostics).run();
 }

@@ -183,6 +183,22 @@ bool add_threads(Construction& c) {
     return true;
 }
 
+/// Returns the first pin with the name of one before it; nullptr: there is none.
+const Pin* declared_twice(const Instance& instance) {
+    std::vector<std::string_view> names;
+    names.reserve(instance.pins.size());
+    for (const auto& pin : instance.pins) {
+        names.push_back(pin->name);
+    }
+    std::ranges::sort(names);
+    if (std::ranges::adjacent_find(names) == names.end()) return nullptr;
+    std::set<std::string_view> seen;
+    for (const auto& pin : instance.pins) {
+        if (!seen.insert(pin->name).second) return pin.get();
+    }
+    return nullptr;
+}
+
 }  // namespace
 
 bool enter_declared(Construction& c) {
@@ -214,6 +230,7 @@ bool enter_declared(Construction& c) {
         }
     }
     std::vector<std::unique_ptr<Pin>> later;
+    instance.pins.reserve(instance.pins.size() + (*c.owned ? c.pins.size() : 0));
     for (auto& [pin, identity] : std::exchange(c.pins, {})) {
         if (identity) {
             pin->function = c.by_identity[identity];
@@ -226,14 +243,11 @@ bool enter_declared(Construction& c) {
     if (!*c.owned) {
         return c.edit->add_declared(instance, std::move(later), std::move(own)) && add_threads(c);
     }
-    std::set<std::string_view> names;
-    for (const auto& pin : instance.pins) {
-        if (!names.insert(pin->name).second) {
-            c.diagnostics->error(
-                "construct-failed", c.request.at,
-                "component '" + component.name + "' declares pin '" + pin->name + "' twice");
-            return false;
-        }
+    if (const Pin* const pin = declared_twice(instance)) {
+        c.diagnostics->error(
+            "construct-failed", c.request.at,
+            "component '" + component.name + "' declares pin '" + pin->name + "' twice");
+        return false;
     }
     return c.edit->add_instance(component, *c.owned, std::move(own)) && add_threads(c);
 }

@@ -2,6 +2,7 @@
 #include "machine/load/construction.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 
 namespace hal {
@@ -21,12 +22,21 @@ bool whole_names(const Instance& instance) {
     return instance.component->plugin->flags & HAL_COMPONENT_WHOLE_NAMES;
 }
 
-// Characters that netlists, the shell or a file name would read otherwise.
+/// By character: whether a name may contain it. Netlists, the shell or a file name would read the
+/// others otherwise.
+constexpr std::array<bool, 256> valid_in_names = [] {
+    std::array<bool, 256> valid{};
+    std::fill(valid.begin() + ' ' + 1, valid.end(), true);
+    valid[0x7f] = false;
+    for (const char c : std::string_view("\"'`#$\\=,[](){}<>|&;*?")) {
+        valid[static_cast<unsigned char>(c)] = false;
+    }
+    return valid;
+}();
+
 bool good_name(std::string_view name) {
-    return std::all_of(name.begin(), name.end(), [](char c) {
-        return static_cast<unsigned char>(c) > ' ' && c != 0x7f &&
-               std::strchr("\"'`#$\\=,[](){}<>|&;*?", c) == nullptr;
-    });
+    return std::all_of(name.begin(), name.end(),
+                       [](char c) { return valid_in_names[static_cast<unsigned char>(c)]; });
 }
 
 bool take_pin(const hal_host* host, const hal_pin_decl* decl, hal_pin* memory) {
