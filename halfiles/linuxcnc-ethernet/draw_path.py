@@ -75,7 +75,7 @@ def main():
         over_time.plot(times[: len(values) : step], values[::step], label=axis, linewidth=0.8)
     over_time.set_xlabel("time (s)")
     over_time.set_ylabel("following error (mm, degrees)")
-    over_time.legend(loc="upper right", ncols=5)
+    over_time.legend(loc="upper center", ncols=5)
     figure.tight_layout()
     figure.savefig(target, dpi=110)
     print(f"the path is drawn in {target}")
