@@ -302,7 +302,9 @@ getp follow.position
         self.assertEqual("2\n", self.good("sim", "--quiet", self.write("m.hal", text)))
         ours = "loadrt --native hostmot2\nreload hostmot2\n"
         self.good("sim", "--quiet", self.write("m.hal", ours))
-        self.assertIn("unknown pin or parameter 'gain.0.gain'", self.error(ours + "getp gain.0.gain\n"))
+        self.assertIn(
+            "unknown pin or parameter 'gain.0.gain'", self.error(ours + "getp gain.0.gain\n")
+        )
 
     def test_linuxcncs_modules_come_first_where_the_environment_says_so(self):
         self.build("sum2", source="gain")
@@ -381,6 +383,25 @@ getp follow.position
             ),
         )
         self.assertEqual(0, done.returncode, done.stderr)
+
+    def test_check_knows_that_drivers_of_mesa_cards_need_hostmot2(self):
+        self.build("hostmot2", "hm2_eth", source="gain")
+        right = "loadrt hostmot2\nloadrt hm2_eth board_ip=10.10.10.10\n"
+        done = self.run_program("check", self.write("m.hal", right))
+        self.assertEqual(0, done.returncode, done.stderr)
+        wrong = "loadrt hm2_eth board_ip=10.10.10.10\nloadrt hostmot2\n"
+        done = self.run_program("check", self.write("m.hal", wrong))
+        self.assertEqual(1, done.returncode)
+        self.assertEqual(
+            """m.hal:1:8: error: module 'hm2_eth' uses 'hostmot2', which is not loaded before it [construct-failed]
+    1 | loadrt hm2_eth board_ip=10.10.10.10
+      |        ^^^^^^^
+      = help: load that first: loadrt hostmot2
+
+1 error
+""",
+            done.stderr.replace(f"{self.folder}/", ""),
+        )
 
     # --- what goes wrong -------------------------------------------------------------------------------------------------
 

@@ -3,6 +3,7 @@
 #include "machine/load/elaborate.hpp"
 
 #include <algorithm>
+#include <array>
 
 #include "machine/load/construct.hpp"
 #include "machine/load/module_library.hpp"
@@ -262,6 +263,21 @@ bool is_unchecked(Elaboration& on, const Token& name, Origin origin) {
     return plugin && (plugin->component->flags & HAL_COMPONENT_MODULE);
 }
 
+/// LinuxCNC's drivers of Mesa cards: they use symbols of hostmot2.
+constexpr std::array<std::string_view, 8> hostmot2_drivers{
+    "hm2_7i43", "hm2_7i90", "hm2_eth", "hm2_pci", "hm2_rpspi", "hm2_spi", "hm2_spix", "hm2_test"};
+
+/// What a module would report when it runs: that the module whose symbols it uses is not loaded.
+void check_module_order(Elaboration& on, const Token& name) {
+    constexpr const char* needed = "hostmot2";
+    if (std::ranges::find(hostmot2_drivers, name.text) == hostmot2_drivers.end()) return;
+    if (on.edit.absences().is_assumed(needed)) return;
+    on.diagnostics.error("construct-failed", name.span,
+                         "module " + hal::quoted(name.text) + " uses " + hal::quoted(needed) +
+                             ", which is not loaded before it",
+                         "", std::string("load that first: loadrt ") + needed);
+}
+
 /// Returns true after reporting that a loaded module uses symbols of this one.
 bool is_used(Elaboration& on, const LoadedComponent& component, Span at) {
     if (!is_module(component)) return false;
@@ -313,6 +329,7 @@ std::optional<Absences::Cause> accepted_absence(Elaboration& on, const Token& na
         cause = absences.assumed(name.text);
     }
     if (cause || !on.check_only || !is_unchecked(on, name, origin)) return cause;
+    check_module_order(on, name);
     absences.assume(name.text);
     return absences.assumed(name.text);
 }
