@@ -162,6 +162,25 @@ class Views(Page):
             self.browser.evaluate("document.querySelector('.floating').innerText"),
         )
 
+    def test_a_graph_without_boxes_says_why(self):
+        netlist = "loadrt threads name1=servo period1=1000000\nloadrt sum2 names=a,b\nstart\n"
+        self.begin(netlist=netlist, view="graph", token=False)
+        shown = "document.getElementById('graph-empty')"
+        self.browser.wait(f"{shown}.hidden === false")
+        self.assertEqual(
+            "No instance has links. The button above lists the instances.",
+            self.browser.evaluate(f"{shown}.textContent"),
+        )
+        self.assertIn(
+            "2 instances without links",
+            self.browser.evaluate("document.querySelector('.bar').textContent"),
+        )
+        self.good("shell", "net", "s", "a.out", "b.in0")
+        self.browser.evaluate("location.reload()")
+        self.browser.wait(
+            f"{shown}.hidden && document.querySelector('canvas').dataset.boxes === '2'"
+        )
+
     def test_the_graph_of_300_instances_folds_groups_and_search_opens_them(self):
         axes, parts = range(25), ("siggen", "limit3", "pid", "scale", "lowpass", "integ")
         netlist = "loadrt threads name1=servo period1=1000000\n"

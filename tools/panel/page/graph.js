@@ -61,6 +61,7 @@ export class View {
         this.details =
             h('div', {class: 'floating', hidden: true, role: 'region', 'aria-label': 'Details'});
         this.note = h('span', {class: 'dim'});
+        this.empty = h('p', {id: 'graph-empty', class: 'dim', hidden: true});
         this.unlinkedButton = h('button', {onclick: () => this.select(unlinkedId)});
         this.foldButton = h('button', {onclick: () => this.foldAll()});
         const all = h('button', {onclick: () => this.drawing.fit()}, 'Show all');
@@ -68,7 +69,7 @@ export class View {
             h('div', {class: 'column'},
               h('div', {class: 'bar'}, this.search, this.names, this.depth, this.grouping,
                 this.foldButton, all, this.unlinkedButton, this.note),
-              h('div', {class: 'fill'}, canvas, this.details)));
+              h('div', {class: 'fill'}, canvas, this.empty, this.details)));
         this.drawing = new GraphCanvas(
             canvas, {select: name => this.select(name), fold: name => this.fold(name)});
         this.load();
@@ -183,9 +184,20 @@ export class View {
         text(this.foldButton, this.unfolded.size > 0 ? 'Fold groups' : 'Open groups');
         this.unlinkedButton.hidden = this.unlinked.length === 0;
         text(this.unlinkedButton, `${counted(this.unlinked.length, 'instance')} without links`);
+        this.empty.hidden = graph.boxes.length > 0;
+        text(this.empty, this.emptyText());
         this.drawing.canvas.dataset.boxes = String(graph.boxes.length);
         this.drawing.show(graph, size);
         this.follow();
+    }
+
+    /// Why the picture has no box.
+    emptyText() {
+        if (this.search.value !== '' && this.depth.value !== '')
+            return `There is no box around '${this.search.value}'`;
+        if (this.unlinked.length > 0)
+            return 'No instance has links. The button above lists the instances.';
+        return 'The machine has no instances.';
     }
 
     follow() {

@@ -114,8 +114,9 @@ export function makeMeter(node, pins) {
                     number(Number(v.toPrecision(4))), x + radius * .68 * Math.cos(angle(v)),
                     y + radius * .68 * Math.sin(angle(v)));
             }
-        context.fillText(options.text ?? '', x, y - radius * .3);
-        context.fillText(options.subtext ?? unit, x, y + radius * .3);
+        // below the middle, where no value is, the needle never covers them
+        context.fillText(options.text ?? '', x, y + radius * .3);
+        context.fillText(options.subtext ?? unit, x, y + radius * .5);
         if (node.kind) {
             context.font = `bold ${radius * .17}px system-ui, sans-serif`;
             context.fillText(number(Number(Number(now).toPrecision(4))), x, y + radius * .78);

@@ -9,7 +9,7 @@ import {seconds, timeLabels, valueLabels} from './scope_axes.js';
 import {Store, Trigger, measure, valueAt} from './scope_data.js';
 import {csv, download, overwritten} from './scope_export.js';
 import {FaultTrigger, faultSource, isFaultSource, nameOfFaults} from './scope_fault_trigger.js';
-import {Labels, write} from './scope_labels.js';
+import {Labels, fitted, write} from './scope_labels.js';
 import {mcap} from './scope_mcap.js';
 import {Picture} from './scope_picture.js';
 import {spectrum} from './scope_spectrum.js';
@@ -850,7 +850,8 @@ export class View {
         context.putImageData(picture.image, 0, 0);
         faults.forEach(({at, text}, i) => {
             const x = cssWidth * (at - from) / (to - from) + 4, y = 28 + 14 * (i % 4);
-            const label = {text: `fault: ${text}`, x, y, paint: this.looks.bad};
+            const whole = `fault: ${text}`;
+            const label = {text: fitted(context, whole, cssWidth - 8), x, y, paint: this.looks.bad};
             write(context, label, this.looks.back, cssWidth);
         });
         this.writeNotice(context, cssWidth, cssHeight);

@@ -13,6 +13,16 @@
 
 const usual = '12px system-ui, sans-serif';
 
+/// Returns the text, or as much of its beginning as fits `width`, and an ellipsis.
+export function fitted(context, text, width, font = usual) {
+    context.font = font;
+    if (context.measureText(text).width <= width) return text;
+    let size = text.length;
+    while (size > 0 && context.measureText(`${text.slice(0, size)}…`).width > width)
+        size--;
+    return `${text.slice(0, size)}…`;
+}
+
 /// Draws a label with a margin in the colour `back`, kept within `width`.
 export function write(context, {text, x, y, paint, font = usual}, back, width) {
     context.font = font;
