@@ -77,8 +77,8 @@ const bus::KeyTable<BusTarget>& bus_keys() {
         {"reference", "the name of a slave", "first slave with a 64-bit clock",
          "name of the slave with the reference clock"},
         {"frame-timeout", bus::time(of_setup(&S::frame_timeout_ns), 10 * us, second), "next cycle",
-         "time after which a frame counts as lost. Requests to slaves wait for 2 ms, for two "
-         "cycles "
+         "time after which a frame counts as lost. A frame that returns earlier is an answer, in a "
+         "later cycle too, but not on a ring. Requests to slaves wait for 2 ms, for two cycles "
          "or for this time, whichever is longest"},
         {"sync-window", bus::time(of_setup(&S::sync_window_ns), 10, second), "`1us`",
          "clock deviation below which a slave counts as synchronised"},

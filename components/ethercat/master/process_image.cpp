@@ -301,21 +301,27 @@ void ProcessImage::fill(Frame& frame, std::uint8_t index,
     }
 }
 
-bool ProcessImage::matches(const Frame& frame,
+bool ProcessImage::matches(const Frame& frame, std::uint8_t index,
                            std::span<const std::uint8_t> answer) const noexcept {
     if (answer.size() < frame.size) return false;
     // Ethertype and length, then of each datagram: command, index, address and length; the
     // circulating bit may have been set on the way.
     if (std::memcmp(&answer[12], &frame.bytes[12], 4) != 0) return false;
     const auto same = [&](std::uint16_t at) {
-        return std::memcmp(&answer[at], &frame.bytes[at], 6) == 0 &&
+        return answer[at + 1U] == index &&
+               std::memcmp(&answer[at + 2U], &frame.bytes[at + 2U], 4) == 0 &&
                (get<std::uint16_t>(&answer[at + 6U]) & 0x87ff) ==
                    get<std::uint16_t>(&frame.bytes[at + 6U]);
     };
-    if (frame.clock_write != 0 && !same(frame.clock_write)) return false;
-    if (!same(frame.clock_read)) return false;
+    // The frame that left before may have distributed the time, and the one in this cycle not.
+    const bool earlier = left_again(frame, index);
+    const auto same_command = [&](std::uint16_t at) { return answer[at] == frame.bytes[at]; };
+    const auto clock = [&](std::uint16_t at) { return same(at) && (earlier || same_command(at)); };
+    if (frame.clock_write != 0 && !clock(frame.clock_write)) return false;
+    if (!clock(frame.clock_read)) return false;
     for (unsigned n = frame.first; n < frame.last; ++n) {
-        if (!same(datagrams_[n].offset)) return false;
+        const std::uint16_t at = datagrams_[n].offset;
+        if (!same(at) || !same_command(at)) return false;
     }
     return true;
 }

@@ -114,8 +114,14 @@ public:
     /// Copies outputs into a frame that is about to leave, with its index and the time at which it
     /// leaves; nullopt: it distributes no time. [realtime]
     void fill(Frame& frame, std::uint8_t index, std::optional<std::uint64_t> dc_time_ns) noexcept;
-    /// Returns whether `answer` has the datagrams of `frame`. [realtime]
-    bool matches(const Frame& frame, std::span<const std::uint8_t> answer) const noexcept;
+    /// Returns whether `answer` has the datagrams of `frame` as it left with an index: in this
+    /// cycle, or in one before. [realtime]
+    bool matches(const Frame& frame, std::uint8_t index,
+                 std::span<const std::uint8_t> answer) const noexcept;
+    /// Returns whether a frame left again since it had an index. [realtime]
+    static bool left_again(const Frame& frame, std::uint8_t index) noexcept {
+        return frame.bytes[frame.clock_read + 1U] != index;
+    }
     /// Takes the inputs and counters of an answer that matches. [realtime]
     void take(const Frame& frame, const std::uint8_t* answer) noexcept;
     /// ORs the inputs of `second` into `first` and adds the working counters: both halves of a

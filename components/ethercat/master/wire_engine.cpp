@@ -273,7 +273,8 @@ void WireEngine::arrived(std::span<const std::uint8_t> bytes, unsigned number) n
         bytes[13] != (ethertype & 0xff)) {
         return;
     }
-    Flight& f = flights_[bytes[first_datagram + 1]];
+    const std::uint8_t index = bytes[first_datagram + 1];
+    Flight& f = flights_[index];
     switch (f.kind) {
     case Flight::Kind::none:
         if (f.merged) {
@@ -284,7 +285,7 @@ void WireEngine::arrived(std::span<const std::uint8_t> bytes, unsigned number) n
         return;
     case Flight::Kind::expired: return count_late();
     case Flight::Kind::cyclic:
-        if (!image_.matches(image_.frames()[f.place], bytes)) break;
+        if (!answers(f, index, bytes)) break;
         if (accept(f, number)) {
             arrived_cyclic(f, bytes);
         }
@@ -298,6 +299,16 @@ void WireEngine::arrived(std::span<const std::uint8_t> bytes, unsigned number) n
     case Flight::Kind::acyclic: return arrived_acyclic(f, bytes, number);
     }
     count_foreign(bytes);
+}
+
+/// Returns whether a frame is a copy of the process data in flight under an index. With a
+/// `frame-timeout` longer than a cycle it may have left in an earlier one; the halves of a ring are
+/// those of the newest cycle.
+bool WireEngine::answers(const Flight& f, std::uint8_t index,
+                         std::span<const std::uint8_t> bytes) const noexcept {
+    const ProcessImage::Frame& frame = image_.frames()[f.place];
+    if (backup_ != nullptr && ProcessImage::left_again(frame, index)) return false;
+    return image_.matches(frame, index, bytes);
 }
 
 void WireEngine::count_late() noexcept {

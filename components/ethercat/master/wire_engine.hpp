@@ -107,6 +107,8 @@ private:
 
     void drain(ethernet::Port& port, unsigned number) noexcept;
     void arrived(std::span<const std::uint8_t> bytes, unsigned number) noexcept;
+    bool answers(const Flight&, std::uint8_t index,
+                 std::span<const std::uint8_t> bytes) const noexcept;
     void arrived_cyclic(Flight&, std::span<const std::uint8_t> bytes) noexcept;
     void arrived_acyclic(Flight&, std::span<const std::uint8_t> bytes, unsigned number) noexcept;
     void count_foreign(std::span<const std::uint8_t> bytes) noexcept;
