@@ -94,6 +94,8 @@ struct Bus {
     std::int64_t skew_ns = 0;
     /// `skew_ns` when no clock was beyond the window
     std::optional<std::int64_t> agreed_skew_ns;
+    /// largest change of `skew_ns` between two looks at the clocks without a jump; it fades
+    std::int64_t skew_jitter_ns = 0;
     int jumped = -1;  ///< device whose reference clock was reported to have jumped; -1: none
     std::int64_t jump_ns = 0;
     std::int64_t jumped_at_ns = 0;  ///< when the first clock behind it left the window

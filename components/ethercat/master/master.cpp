@@ -78,6 +78,7 @@ void Master::rescan() noexcept {
     bus.reference = -1;
     bus.skew_ns = 0;
     bus.agreed_skew_ns.reset();
+    bus.skew_jitter_ns = 0;
     bus.jumped = -1;
     bus.status.dc_active = false;
     bus.image.set_reference(0, false);

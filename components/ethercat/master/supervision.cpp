@@ -371,19 +371,35 @@ static Task<void> resynchronise(Channel& c, Bus& bus, Device& d) noexcept {
 /// 092Ch has 31 bits for it; a larger deviation is shown as this one.
 static constexpr std::int64_t largest_deviation_ns = 0x7fff'ffff;
 
-/// A smaller jump looks like the jitter of frames.
-static constexpr std::int64_t min_jump_ns = 100'000;
+/// Jumps of this size differ from the jitter of frames and the drift of clocks; smaller ones where
+/// these are smaller.
+static constexpr std::int64_t clear_jump_ns = 100'000;
+
+/// What a clock makes up of a jump until it is looked at: 250 ppm of the time between two looks.
+static constexpr std::int64_t corrected_ns = clocks_every_ns / 4000;
 
 /// Returns by how much the reference clock has jumped against the clock of the cycle, when that is
 /// why a slave deviates by `deviation_ns` from it; 0: it is not.
 static std::int64_t jump_of_reference(const Bus& bus, std::int64_t deviation_ns) noexcept {
     if (!bus.agreed_skew_ns || bus.reference < 0) return 0;
-    if (bus.config(*bus.devices[static_cast<std::size_t>(bus.reference)]) == nullptr) return 0;
     const std::int64_t jump = bus.skew_ns - *bus.agreed_skew_ns;
     const std::int64_t size = std::abs(jump);
-    if (size < min_jump_ns) return 0;
+    if (size < std::clamp(2 * bus.skew_jitter_ns, tolerable_deviation_ns, clear_jump_ns)) return 0;
     if (deviation_ns >= largest_deviation_ns) return size >= largest_deviation_ns ? jump : 0;
-    return std::abs(size - deviation_ns) <= size / 4 ? jump : 0;
+    const bool alike =
+        deviation_ns <= size + size / 4 && deviation_ns + corrected_ns >= size - size / 4;
+    return alike ? jump : 0;
+}
+
+/// Notes that no clock is beyond the window, and how much the time of the reference clock varies
+/// against that of the cycle.
+static void note_agreement(Bus& bus) noexcept {
+    if (bus.agreed_skew_ns) {
+        const std::int64_t change = std::abs(bus.skew_ns - *bus.agreed_skew_ns);
+        const std::int64_t faded = bus.skew_jitter_ns - bus.skew_jitter_ns / 16;
+        bus.skew_jitter_ns = change < clear_jump_ns ? std::max(change, faded) : faded;
+    }
+    bus.agreed_skew_ns = bus.skew_ns;
 }
 
 /// Notes that the clock of a slave has left the window, and whether the reference clock is why.
@@ -564,7 +580,7 @@ static Task<void> watch_clocks(Channel& c, Bus& bus, std::int64_t until_ns) noex
         if (looks || drifts) {
             co_await look_at_clocks(c, bus);
         } else {
-            bus.agreed_skew_ns = bus.skew_ns;
+            note_agreement(bus);
         }
     }
 }

@@ -514,6 +514,9 @@ private:
             unknown_raised_ = false;
             end(unknown_fault_);
         }
+        if (event == Event::dc_synchronised) {
+            end(jump_fault_);
+        }
         if (event == Event::no_slaves) {
             begin(nobody_fault_, event);
         }
@@ -567,6 +570,8 @@ private:
         }
         if (named) {
             slave_event(event, slave, first, second);
+        } else if (event == Event::dc_jumped) {
+            begin(jump_fault_, event, master::Events::bus, std::abs(first));
         }
         bus_event(event, first);
     }
@@ -620,6 +625,7 @@ private:
     }, 256, [](const config::Happened& h, const std::string&) { return config::subject(h); }};
     std::vector<hal::LastingFault> slave_faults_, clock_faults_, data_faults_;  // by slave
     hal::LastingFault period_fault_, unknown_fault_, nobody_fault_, link_fault_, other_fault_;
+    hal::LastingFault jump_fault_;  // of a reference clock that the configuration does not name
     std::int64_t now_ns_ = 0;
     std::int64_t other_seen_ns_ = 0;
     bool unknown_raised_ = false;

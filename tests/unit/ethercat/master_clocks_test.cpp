@@ -212,6 +212,50 @@ TEST(EthercatClocks, A_reference_clock_that_jumps_is_named_and_not_the_slaves_be
     }
 }
 
+TEST(EthercatClocks, A_small_jump_of_the_reference_clock_is_not_taken_for_one_of_another_clock) {
+    for (const std::int64_t jump_ns : {60'000LL, -60'000LL, 80'000LL}) {
+        World w;
+        for (unsigned n = 0; n < 3; ++n) {
+            w.add(0x100 + n);
+        }
+        auto setup = with_clocks(3);
+        setup.dc_loss_ns = 1'000'000;
+        w.begin(setup);
+        ASSERT_TRUE(w.operational(3000)) << w.log.text();
+        w.run(3000);
+        w.line.controller(0).jump_clock(jump_ns, w.now_ns);
+        w.run(1000);
+        ASSERT_EQ(w.log.count(Event::dc_jumped), 1U) << jump_ns << w.log.text();
+        EXPECT_EQ(w.log.last(Event::dc_jumped)->slave, 0U);
+        EXPECT_EQ(w.log.count(Event::dc_lost), 0U) << jump_ns << w.log.text();
+        w.run(4000);
+        w.line.controller(2).jump_clock(jump_ns, w.now_ns);
+        w.run(1000);
+        ASSERT_EQ(w.log.count(Event::dc_lost), 1U) << jump_ns << w.log.text();
+        EXPECT_EQ(w.log.last(Event::dc_lost)->slave, 2U) << "its own clock";
+        EXPECT_EQ(w.log.count(Event::dc_jumped), 1U);
+    }
+}
+
+TEST(EthercatClocks, A_reference_clock_that_the_setup_does_not_name_is_named_by_its_position) {
+    World w;
+    for (unsigned n = 0; n < 3; ++n) {
+        w.add(0x100 + n);
+    }
+    auto setup = with_clocks(3);
+    setup.slaves.erase(setup.slaves.begin());
+    w.begin(setup);
+    ASSERT_TRUE(w.operational(3000)) << w.log.text();
+    w.run(3000);
+    w.line.controller(0).jump_clock(400'000, w.now_ns);
+    w.run(1000);
+    ASSERT_EQ(w.log.count(Event::dc_jumped), 1U) << w.log.text();
+    EXPECT_EQ(w.log.last(Event::dc_jumped)->slave, Events::of_position + 0U);
+    EXPECT_EQ(w.log.count(Event::dc_lost), 0U) << w.log.text();
+    w.run(4000);
+    EXPECT_EQ(w.log.count(Event::dc_jump_ended), 1U) << w.log.text();
+}
+
 TEST(EthercatClocks, A_slave_out_of_step_waits_in_SAFE_OP_where_the_setup_says_so) {
     World w;
     for (unsigned n = 0; n < 3; ++n) {
