@@ -47,27 +47,45 @@ bool AxisFaults::has_voltage() const noexcept {
 }
 
 bool AxisFaults::present(DriveFault cause) const noexcept {
-    const auto simulated = [&](std::uint16_t bit) { return (values_.simulated_faults & bit) != 0; };
-    const MotorSettings& motor = train_.motor();
-    switch (cause) {
-    case DriveFault::over_current:
-        return simulated(simulated::over_current) ||
-               train_.plant().heat() > (latched(cause) ? max_heat_at_reset : max_heat);
-    case DriveFault::over_voltage:
-        return simulated(simulated::over_voltage) ||
-               around_.dc_link > max_voltage * motor.rated_voltage;
-    case DriveFault::under_voltage: return simulated(simulated::under_voltage) || !has_voltage();
-    case DriveFault::over_temperature: return simulated(simulated::over_temperature);
-    case DriveFault::position_sensor:
-        return simulated(simulated::encoder_broken) || around_.encoder_cut;
-    case DriveFault::over_speed:
-        return std::abs(train_.plant().speed()) >
-               max_speed * motor.highest_speed * std::numbers::pi / 30;
-    case DriveFault::connection: return bus_ != nullptr && !bus_->master_alive();
-    case DriveFault::following_error:
-    case DriveFault::device: return false;
-    }
-    return false;
+    if (cause == DriveFault::connection) return bus_ != nullptr && !bus_->master_alive();
+    return (causes_present() >> static_cast<unsigned>(cause) & 1) != 0;
+}
+
+bool AxisFaults::is_simulated(std::uint16_t bit) const noexcept {
+    return (values_.simulated_faults & bit) != 0;
+}
+
+bool AxisFaults::has_over_current() const noexcept {
+    const double limit = latched(DriveFault::over_current) ? max_heat_at_reset : max_heat;
+    return is_simulated(simulated::over_current) || train_.plant().heat() > limit;
+}
+
+bool AxisFaults::has_over_voltage() const noexcept {
+    return is_simulated(simulated::over_voltage) ||
+           around_.dc_link > max_voltage * train_.motor().rated_voltage;
+}
+
+bool AxisFaults::has_no_encoder() const noexcept {
+    return is_simulated(simulated::encoder_broken) || around_.encoder_cut;
+}
+
+bool AxisFaults::is_too_fast() const noexcept {
+    return std::abs(train_.plant().speed()) >
+           max_speed * train_.motor().highest_speed * std::numbers::pi / 30;
+}
+
+std::uint16_t AxisFaults::causes_present() const noexcept {
+    unsigned bits = 0;
+    const auto watch = [&](DriveFault cause, bool is_present) {
+        bits |= static_cast<unsigned>(is_present) << static_cast<unsigned>(cause);
+    };
+    watch(DriveFault::over_current, has_over_current());
+    watch(DriveFault::over_voltage, has_over_voltage());
+    watch(DriveFault::under_voltage, is_simulated(simulated::under_voltage) || !has_voltage());
+    watch(DriveFault::over_temperature, is_simulated(simulated::over_temperature));
+    watch(DriveFault::position_sensor, has_no_encoder());
+    watch(DriveFault::over_speed, is_too_fast());
+    return static_cast<std::uint16_t>(bits);
 }
 
 bool AxisFaults::latch(DriveFault cause, std::int32_t detail) noexcept {

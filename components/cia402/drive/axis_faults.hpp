@@ -52,7 +52,11 @@ public:
     /// Sets the code of the next DriveFault::device.
     void set_device_code(std::uint16_t code) noexcept { device_code_ = code; }
     bool present(DriveFault) const noexcept;
+    /// Returns a bit for each cause that is present, of those that the faults see by themselves:
+    /// not the connection and the following error.
+    std::uint16_t causes_present() const noexcept;
     bool has_voltage() const noexcept;
+    bool has_no_encoder() const noexcept;
     /// Returns true when the motor can still be braked by a ramp.
     static bool controllable(DriveFault) noexcept;
     /// Latches and reports a cause; 603Fh shows the last one. Returns false when it is latched
@@ -62,6 +66,10 @@ public:
     bool reset() noexcept;
 
 private:
+    bool is_simulated(std::uint16_t bit) const noexcept;
+    bool has_over_current() const noexcept;
+    bool has_over_voltage() const noexcept;
+    bool is_too_fast() const noexcept;
     std::uint16_t code_of(DriveFault) const noexcept;
     bool latched(DriveFault cause) const noexcept {
         return (latched_ >> static_cast<unsigned>(cause) & 1) != 0;

@@ -13,12 +13,14 @@
 
 namespace hal::cia402 {
 
-/// Rounds to the next integer; clamps what is beyond any counter. [any]
+/// Rounds to the next integer, halves away from zero; clamps what is beyond any counter. [any]
 inline std::int64_t whole(double value) noexcept {
-    constexpr double max = 1LL << 52;
-    if (value >= -max && value <= max) return std::llround(value);
-    if (value > 0) return 1LL << 52;
-    return -(1LL << 52);
+    constexpr std::int64_t max = 1LL << 52;
+    if (!(value > -static_cast<double>(max))) return -max;
+    if (value > static_cast<double>(max)) return max;
+    const auto towards_zero = static_cast<std::int64_t>(value);
+    const double rest = value - static_cast<double>(towards_zero);
+    return towards_zero + static_cast<int>(rest >= 0.5) - static_cast<int>(rest <= -0.5);
 }
 
 /// Converts 1/min to 1/s. [any]

@@ -3,6 +3,7 @@
 #include "cia402/drive/drive_axis.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -91,7 +92,7 @@ Disturbance DriveAxis::disturbance() const noexcept {
     return {.load = around_.load + values_.load_torque / 1000.0,
             .torque_offset = adds_torque ? train_.scale().torque(values_.torque_offset) : 0,
             .brake_closed = brake_closed(),
-            .encoder_broken = faults_.present(DriveFault::position_sensor)};
+            .encoder_broken = faults_.has_no_encoder()};
 }
 
 void DriveAxis::restart_modes() noexcept {
@@ -304,14 +305,11 @@ void DriveAxis::continue_stop(double dt) noexcept {
 
 void DriveAxis::watch_causes() noexcept {
     const bool on = state_ == State::switched_on || torque_on();
-    for (unsigned n = 0; n < AxisFaults::causes; ++n) {
-        const auto cause = static_cast<DriveFault>(n);
-        if (cause == DriveFault::connection || cause == DriveFault::following_error) continue;
+    for (unsigned left = faults_.causes_present(); left != 0; left &= left - 1) {
+        const auto cause = static_cast<DriveFault>(std::countr_zero(left));
         // Missing voltage is not a fault while the drive is off.
         if (cause == DriveFault::under_voltage && !on) continue;
-        if (faults_.present(cause)) {
-            raise(cause);
-        }
+        raise(cause);
     }
 }
 
@@ -477,12 +475,20 @@ WriteCheck DriveAxis::check(std::uint16_t index,
     }
 }
 
+/// Shows what the controlword changes at once. A word that is written in each cycle changes
+/// nothing most of the time; the next step shows the rest.
+void DriveAxis::command_written() noexcept {
+    const State state = state_;
+    const std::uint16_t bits = control_.bits;
+    accept_controlword();
+    if (state_ != state || control_.bits != bits) {
+        publish();
+    }
+}
+
 void DriveAxis::written(std::uint16_t index, std::uint8_t sub) noexcept {
     switch (index) {
-    case object::controlword:
-        accept_controlword();
-        publish();
-        break;
+    case object::controlword: command_written(); break;
     case object::target_position:
     case object::position_offset: modes_.set_point_written(Mode::cyclic_position); break;
     case object::target_velocity:

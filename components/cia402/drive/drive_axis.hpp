@@ -77,6 +77,7 @@ private:
     };
 
     void accept_controlword() noexcept;
+    void command_written() noexcept;
     void command_ready(Command) noexcept;
     void command_switched_on(Command) noexcept;
     void command_enabled(Command) noexcept;

@@ -10,8 +10,12 @@ namespace hal::cia402 {
 namespace {
 constexpr double max_step = 0.00025;
 constexpr double infinity = std::numeric_limits<double>::infinity();
-double towards(double value, double goal, double dt, double time_constant) noexcept {
-    return time_constant > 0 ? goal + (value - goal) * std::exp(-dt / time_constant) : goal;
+/// Returns the part of a difference that is left after a time; 0: none.
+double rest_after(double dt, double time_constant) noexcept {
+    return time_constant > 0 ? std::exp(-dt / time_constant) : 0;
+}
+double towards(double value, double goal, double rest) noexcept {
+    return rest > 0 ? goal + (value - goal) * rest : goal;
 }
 }  // namespace
 
@@ -35,14 +39,19 @@ Range Plant::positive_limit() const noexcept { return {motor_.positive_limit, in
 
 void Plant::step(double dt, double demand, double load, bool brake_closed) noexcept {
     before_ = place_;
+    if (rests(demand, load) && within_stops()) return;
     const int steps = std::max(1, static_cast<int>(std::ceil(dt / max_step)));
     const double h = dt / steps;
+    if (h != decay_.length) {
+        decay_ = {h, rest_after(h, motor_.current_loop_time),
+                  rest_after(h, motor_.thermal_time_constant)};
+    }
+    const double damping = 1 + h * motor_.viscous_friction / motor_.inertia;
     const double still =
         (motor_.coulomb_friction + (brake_closed ? motor_.brake_torque : 0)) * h / motor_.inertia;
     for (int n = 0; n < steps; ++n) {
-        torque_ = towards(torque_, demand, h, motor_.current_loop_time);
-        double speed = (speed_ + h * (torque_ + load) / motor_.inertia) /
-                       (1 + h * motor_.viscous_friction / motor_.inertia);
+        torque_ = towards(torque_, demand, decay_.torque);
+        double speed = (speed_ + h * (torque_ + load) / motor_.inertia) / damping;
         if (speed > still) {
             speed = speed - still;
         } else if (speed < -still) {
@@ -62,7 +71,7 @@ void Plant::step(double dt, double demand, double load, bool brake_closed) noexc
             speed_ = std::max(speed_, 0.0);
         }
         const double share = motor_.rated_torque > 0 ? torque_ / motor_.rated_torque : 0;
-        heat_ = towards(heat_, share * share, h, motor_.thermal_time_constant);
+        heat_ = towards(heat_, share * share, decay_.heat);
     }
 }
 

@@ -54,8 +54,23 @@ public:
     const MotorSettings& motor() const noexcept { return motor_; }
 
 private:
+    /// What a substep of `length` s leaves of the differences of torque and heat from their goals.
+    struct Decay {
+        double length = 0;
+        double torque = 0;
+        double heat = 0;
+    };
+    /// Returns true when a step changes nothing.
+    bool rests(double torque, double load) const noexcept {
+        return speed_ == 0 && torque_ == 0 && heat_ == 0 && torque == 0 && load == 0;
+    }
+    bool within_stops() const noexcept {
+        return place_ > motor_.negative_stop && place_ < motor_.positive_stop;
+    }
+
     const MotorSettings motor_;
     const double per_radian_;
+    Decay decay_;
     double place_, before_, speed_ = 0, torque_ = 0, heat_ = 0;
 };
 

@@ -164,7 +164,9 @@ void Firmware::run(esc::Pdi& pdi, std::int64_t now_ns) noexcept {
         change(pdi, target_);
     }
     mailbox_.run(pdi, state_, now_ns);
+    runs_free_ = false;
     if (state_ == State::safeop || state_ == State::op) {
+        runs_free_ = !pdi.sync().active;
         run_process_data(pdi);
         wait_for_op(pdi);
         if (state_ == State::op) {
@@ -172,6 +174,11 @@ void Firmware::run(esc::Pdi& pdi, std::int64_t now_ns) noexcept {
         }
     }
     step_idle();
+}
+
+/// In OP with SYNC0, a pulse or a frame brings it further.
+bool Firmware::waits() const noexcept {
+    return state_ != State::op || runs_free_ || change_at_ns_ >= 0 || mailbox_.waits();
 }
 
 /// Takes new outputs out of all sync managers. Returns whether there are any. Their first sample is
@@ -194,7 +201,7 @@ bool Firmware::read_outputs(esc::Pdi& pdi) noexcept {
 }
 
 void Firmware::run_process_data(esc::Pdi& pdi) noexcept {
-    const auto sync = pdi.sync();
+    const auto& sync = pdi.sync();
     if (samples_ > 1) return run_samples(pdi, sync);
     if (!sync.active) {
         read_outputs(pdi);
@@ -390,7 +397,7 @@ bool Firmware::fits(esc::Pdi& pdi, const SyncArea& area) const noexcept {
 unsigned Firmware::find_samples(esc::Pdi& pdi) noexcept {
     const unsigned max = design_.sampled.max_samples;
     if (max < 2) return 1;
-    const auto sync = pdi.sync();
+    const auto& sync = pdi.sync();
     if (sync.sync1_active && sync.sync0_cycle_ns != 0) {
         return std::min(sync.sync1_cycle_ns / sync.sync0_cycle_ns + 1, max);
     }
@@ -431,7 +438,7 @@ std::uint16_t Firmware::check_sync(esc::Pdi& pdi) const noexcept {
     }
     if (!design_.dc) return 0x0028;
     if ((activation & 2) == 0) return 0x0030;
-    const auto sync = pdi.sync();
+    const auto& sync = pdi.sync();
     if (sync.sync0_cycle_ns == 0) return 0x0035;
     if (sync.sync0_cycle_ns < design_.shortest_cycle_ns) return 0x002e;
     return 0;
@@ -441,7 +448,7 @@ std::uint16_t Firmware::check_sync(esc::Pdi& pdi) const noexcept {
 void Firmware::wait_for_op(esc::Pdi& pdi) noexcept {
     if (op_since_ns_ < 0 || state_ != State::safeop) return;
     const bool outputs = bytes(outputs_) == 0 || received_;
-    const auto sync = pdi.sync();
+    const auto& sync = pdi.sync();
     const bool synchronised = !sync.active || sync.pulses != 0;
     if (outputs && synchronised) {
         op_since_ns_ = -1;
@@ -464,7 +471,7 @@ void Firmware::watch(esc::Pdi& pdi) noexcept {
         if (watched && pdi.watchdog_expired()) return fail(pdi, State::safeop, 0x001b);
         if (!sm.enabled) return fail(pdi, State::safeop, 0x001d);
     }
-    const auto sync = pdi.sync();
+    const auto& sync = pdi.sync();
     if (sync.active && sync.last_pulse_ns != 0 &&
         now_ns_ - sync.last_pulse_ns > lost_pulses * sync.sync0_cycle_ns) {
         fail(pdi, State::safeop, 0x002c);
@@ -486,7 +493,7 @@ void Firmware::enter(esc::Pdi& pdi, State to) noexcept {
         mailbox_.start(design_.sii.mailboxes);
     }
     if (to == State::safeop && state_ == State::preop) {
-        const auto sync = pdi.sync();
+        const auto& sync = pdi.sync();
         received_ = false;
         last_step_ns_ = now_ns_;
         pulses_ = sync.active ? sync.pulses : 0;

@@ -119,6 +119,7 @@ public:
     void power_off() noexcept override;
     void rest(std::int64_t now_ns) noexcept override;
     void run(esc::Pdi&, std::int64_t now_ns) noexcept override;
+    bool waits() const noexcept override;
 
     FirmwareFaults& faults() noexcept { return faults_; }  ///< [any]
     /// [any]
@@ -184,6 +185,7 @@ private:
     std::atomic<std::uint32_t> dropped_emergencies_{0};
     bool error_ = false;
     bool received_ = false;  ///< outputs since SAFE-OP
+    bool runs_free_ = false;  ///< steps whenever it runs, without SYNC0
     std::int64_t now_ns_ = 0;
     std::int64_t last_step_ns_ = 0;
     std::int64_t op_since_ns_ = 0;

@@ -26,6 +26,8 @@ public:
     void stop() noexcept { running_ = false; }
     /// Works once, if it is started.
     void run(esc::Pdi&, State, std::int64_t now_ns) noexcept;
+    /// Returns whether an answer waits to be sent.
+    bool waits() const noexcept { return running_ && (!outbox_.empty() || resend_newest_); }
     /// Queues an emergency. Returns false when the outbox is full: the emergency is dropped.
     bool send(const coe::Emergency&) noexcept;
 

@@ -98,6 +98,14 @@ void ServoAxis::copy_surroundings() noexcept {
 /// Takes the cycle of SYNC0 as the time between two set-points, 60C2h.
 void ServoAxis::follow_sync_cycle(std::int64_t cycle_ns) noexcept {
     if (cycle_ns <= 0) return;
+    if (cycle_ns != sync_cycle_ns_) {
+        set_sync_cycle(cycle_ns);
+    }
+    axis_.values().interpolation_period = period_;
+    axis_.values().interpolation_exponent = exponent_;
+}
+
+void ServoAxis::set_sync_cycle(std::int64_t cycle_ns) noexcept {
     std::int64_t unit = 1'000'000;
     int exponent = -3;
     while (exponent > -6 && (cycle_ns % unit != 0 || cycle_ns / unit > 255)) {
@@ -105,8 +113,9 @@ void ServoAxis::follow_sync_cycle(std::int64_t cycle_ns) noexcept {
         --exponent;
     }
     const auto periods = std::clamp<std::int64_t>((cycle_ns + unit / 2) / unit, 1, 255);
-    axis_.values().interpolation_period = static_cast<std::uint8_t>(periods);
-    axis_.values().interpolation_exponent = static_cast<std::int8_t>(exponent);
+    sync_cycle_ns_ = cycle_ns;
+    period_ = static_cast<std::uint8_t>(periods);
+    exponent_ = static_cast<std::int8_t>(exponent);
 }
 
 /// Divides a time into steps that the axis can make, s.

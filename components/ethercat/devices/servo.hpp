@@ -67,6 +67,7 @@ private:
 
     void copy_surroundings() noexcept;
     void follow_sync_cycle(std::int64_t cycle_ns) noexcept;
+    void set_sync_cycle(std::int64_t cycle_ns) noexcept;
     template <class Advance>
     static void in_steps(std::int64_t dt_ns, Advance) noexcept;
     void show(bool outputs_valid) noexcept;
@@ -79,6 +80,9 @@ private:
     unsigned faults_ = 0;
     bool outputs_valid_ = false;
     bool command_waits_ = false;  ///< a controlword was written while the outputs were not valid
+    std::int64_t sync_cycle_ns_ = 0;  ///< that period_ and exponent_ are of
+    std::uint8_t period_ = 0;  ///< 60C2h:1
+    std::int8_t exponent_ = 0;  ///< 60C2h:2
 
     std::atomic<double> shown_position_{0};
     std::atomic<double> shown_velocity_{0};

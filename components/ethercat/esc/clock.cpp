@@ -1,15 +1,18 @@
 // SPDX-License-Identifier: MIT
 #include "ethercat/esc/clock.hpp"
 
-#include <cmath>
-
 namespace hal::ethercat::esc {
+
+/// Rounds down; of numbers that fit.
+static std::int64_t whole_below(double value) noexcept {
+    const auto towards_zero = static_cast<std::int64_t>(value);
+    return towards_zero - static_cast<std::int64_t>(static_cast<double>(towards_zero) > value);
+}
 
 std::int64_t Clock::at(std::int64_t now_ns) const noexcept {
     const std::int64_t passed = now_ns - base_now_;
     return base_local_ + passed +
-           static_cast<std::int64_t>(
-               std::floor(fraction_ + static_cast<double>(passed) * (drift_ + correction_)));
+           whole_below(fraction_ + static_cast<double>(passed) * (drift_ + correction_));
 }
 
 /// Beyond this many ns a time is never reached: 31 years.
@@ -21,7 +24,7 @@ std::int64_t Clock::time_of(std::int64_t local_ns) const noexcept {
                                                 static_cast<std::uint64_t>(base_local_));
     if (left > never_ns || left < -never_ns) return INT64_MAX;
     const double ahead = (static_cast<double>(left) * rate + fraction_) / (1.0 + rate);
-    std::int64_t now = base_now_ + left - static_cast<std::int64_t>(std::floor(ahead));
+    std::int64_t now = base_now_ + left - whole_below(ahead);
     for (int i = 0; i < 4 && at(now) < local_ns; ++i) {
         ++now;
     }
@@ -34,18 +37,18 @@ std::int64_t Clock::time_of(std::int64_t local_ns) const noexcept {
 void Clock::rebase(std::int64_t now_ns) noexcept {
     const std::int64_t passed = now_ns - base_now_;
     const double exact = fraction_ + static_cast<double>(passed) * (drift_ + correction_);
-    const double whole = std::floor(exact);
-    base_local_ += passed + static_cast<std::int64_t>(whole);
-    fraction_ = exact - whole;
+    const std::int64_t whole = whole_below(exact);
+    base_local_ += passed + whole;
+    fraction_ = exact - static_cast<double>(whole);
     base_now_ = now_ns;
 }
 
 void Clock::shift(double ns, std::int64_t now_ns) noexcept {
     rebase(now_ns);
     const double exact = fraction_ + ns;
-    const double whole = std::floor(exact);
-    base_local_ += static_cast<std::int64_t>(whole);
-    fraction_ = exact - whole;
+    const std::int64_t whole = whole_below(exact);
+    base_local_ += whole;
+    fraction_ = exact - static_cast<double>(whole);
 }
 
 }  // namespace hal::ethercat::esc

@@ -31,10 +31,11 @@ struct Range {
     }
 };
 /// Registers that only keep what the master writes.
-constexpr Range plain[]{
-    {registers::station_address, 2},        {registers::dl_control, 4},
-    {registers::ecat_event_mask, 2},        {registers::watchdog_divider, 2},
-    {registers::pdi_watchdog, 2},           {registers::process_data_watchdog, 2},
+constexpr Range plain[]{{registers::station_address, 2}, {registers::dl_control, 4},
+                        {registers::ecat_event_mask, 2}, {registers::watchdog_divider, 2},
+                        {registers::pdi_watchdog, 2},    {registers::process_data_watchdog, 2}};
+/// The same of the distributed clock.
+constexpr Range plain_of_clock[]{
     {registers::dc_system_time_offset, 8},  {registers::dc_system_time_delay, 4},
     {registers::dc_speed_counter_start, 2}, {registers::dc_filter_depth, 2},
     {registers::dc_cyclic_unit_control, 2}, {registers::dc_start_time, 8},
@@ -115,6 +116,7 @@ void Controller::power_on(std::int64_t now_ns) noexcept {
         application_->power_on(*this);
     }
     find_due();
+    update_interest();
 }
 
 void Controller::execute(const Frame& frame, std::int64_t first_bit_ns) noexcept {
@@ -138,10 +140,30 @@ void Controller::execute(const Frame& frame, std::int64_t first_bit_ns) noexcept
     }
     advance(last_bit_ns);
     commit(last_bit_ns);
-    if (touched_ || last_bit_ns - last_run_ns_ >= controller_facts::bystander_ns) {
+    if (touched_ || last_bit_ns >= interest_->run_ns) {
         run_application(last_bit_ns);
     }
     find_due();
+    update_interest();
+}
+
+/// Keeps what the line compares with its frames.
+void Controller::update_interest() noexcept {
+    FrameInterest& interest = *interest_;
+    interest.powered = powered_;
+    interest.open_ports = ports_.open();
+    interest.station = station_address();
+    const bool has_alias = (memory_[registers::dl_alias_enable] & 1) != 0;
+    interest.alias =
+        has_alias ? get<std::uint16_t>(&memory_[registers::station_alias]) : interest.station;
+    interest.has_events = (get<std::uint16_t>(&memory_[registers::ecat_event_mask]) &
+                           get<std::uint16_t>(&memory_[registers::ecat_event])) != 0;
+    interest.first_logical = fmmus_.first();
+    interest.end_logical = fmmus_.last();
+    interest.maps_registers = fmmus_.reaches_below(controller_facts::first_memory);
+    interest.due_ns = due_ns_;
+    const bool waits = application_ != nullptr && application_->waits();
+    interest.run_ns = waits ? last_run_ns_ + controller_facts::bystander_ns : INT64_MAX;
 }
 
 /// Takes over what the frame wrote: its check sequence is good.
@@ -164,6 +186,7 @@ void Controller::power_off() noexcept {
     if (application_ != nullptr) {
         application_->power_off();
     }
+    update_interest();
 }
 
 void Controller::work_until(std::int64_t now_ns) noexcept {
@@ -189,6 +212,7 @@ void Controller::work_until(std::int64_t now_ns) noexcept {
         run_application(at);
         find_due();
     }
+    update_interest();
 }
 
 void Controller::run_application(std::int64_t now_ns) noexcept {
@@ -227,12 +251,14 @@ void Controller::set_drift(double ppm, std::int64_t now_ns) noexcept {
     dc_.clock().set_drift(ppm, now_ns);
     dc_.clock_changed(now_ns);
     find_due();
+    update_interest();
 }
 
 void Controller::jump_clock(std::int64_t ns, std::int64_t now_ns) noexcept {
     dc_.clock().shift(static_cast<double>(ns), now_ns);
     dc_.clock_changed(now_ns);
     find_due();
+    update_interest();
 }
 
 std::optional<std::uint16_t> Controller::take_al_control() noexcept {
@@ -329,12 +355,14 @@ void Controller::update_ports() noexcept {
 void Controller::set_link(unsigned port, bool up) noexcept {
     if (ports_.set_link(port, up, powered_)) {
         update_ports();
+        update_interest();
     }
 }
 
 void Controller::frame_at_closed_port(unsigned port) noexcept {
     if (ports_.frame_at_closed_port(port)) {
         update_ports();
+        update_interest();
     }
 }
 
@@ -368,7 +396,7 @@ void Controller::read_registers(std::uint16_t address, std::span<std::uint8_t> t
         eeprom_.show_status(now_ns_);
     }
     if (covers(register_facts::sync_managers)) {
-        sms_.show_status();
+        sms_.show_status(address, to.size());
     }
     std::memcpy(to.data(), &memory_[address], to.size());
     if (clock) {
@@ -405,6 +433,9 @@ public:
     bool covers(const register_facts::Range& range) const noexcept {
         return range.touched(address_, bytes_.size());
     }
+    bool is_within(const register_facts::Range& range) const noexcept {
+        return address_ >= range.first && address_ + bytes_.size() <= range.first + range.length;
+    }
     /// Returns the part of the bytes that is in a range that they cover, and its address.
     WrittenRegisters part(const register_facts::Range& range) const noexcept {
         const std::size_t first = std::max<std::size_t>(range.first, address_);
@@ -430,14 +461,28 @@ void Controller::write_registers(std::uint16_t address,
     using namespace register_facts;
     const WrittenRegisters write(address, from);
     if (write.covers(dc) && !settings_.dc) return;
+    if (address < dc.first) {
+        write_controller(write);
+    }
     if (write.covers(dc)) {
-        latch_times(write);
+        write_clock(write);
     }
-    for (const Range& range : plain) {
-        if (write.covers(range)) {
-            keep(write.part(range));
-        }
-    }
+}
+
+/// Writes registers of the distributed clock. Most writes have the system time alone: one to all
+/// slaves in each cycle.
+void Controller::write_clock(const WrittenRegisters& write) noexcept {
+    using namespace register_facts;
+    latch_times(write);
+    if (write.is_within(system_time)) return;
+    keep_parts(write, plain_of_clock);
+    adjust_clock(write);
+}
+
+/// Writes registers below those of the distributed clock.
+void Controller::write_controller(const WrittenRegisters& write) noexcept {
+    using namespace register_facts;
+    keep_parts(write, plain);
     for (const Range& range : counters) {
         if (write.covers(range)) {
             std::fill_n(&memory_[range.first], range.length, std::uint8_t{0});
@@ -464,7 +509,15 @@ void Controller::write_registers(std::uint16_t address,
     if (write.covers(sync_managers)) {
         write_sync_managers(write);
     }
-    adjust_clock(write);
+}
+
+void Controller::keep_parts(const WrittenRegisters& write,
+                            std::span<const register_facts::Range> ranges) noexcept {
+    for (const register_facts::Range& range : ranges) {
+        if (write.covers(range)) {
+            keep(write.part(range));
+        }
+    }
 }
 
 void Controller::keep(const WrittenRegisters& part) noexcept {
@@ -474,12 +527,11 @@ void Controller::keep(const WrittenRegisters& part) noexcept {
 void Controller::latch_times(const WrittenRegisters& write) noexcept {
     using namespace register_facts;
     if (write.covers(system_time) && write.address() <= registers::dc_system_time) {
-        std::array<std::uint8_t, 8> time{};
-        for (unsigned i = 0; i < time.size(); ++i) {
-            time[i] = write.byte(registers::dc_system_time + i, memory_.get());
-        }
-        dc_.receive_system_time(get<std::uint64_t>(time.data()),
-                                write.part(system_time).bytes().size(), now_ns_);
+        // What is not written stays as it was read last.
+        auto time = get<std::uint64_t>(&memory_[registers::dc_system_time]);
+        const auto written = write.part(system_time).bytes();
+        std::memcpy(&time, written.data(), written.size());
+        dc_.receive_system_time(time, written.size(), now_ns_);
     }
     if (write.covers(receive_time)) {
         dc_.latch_receive_times(now_ns_, frame_number_);
@@ -544,7 +596,10 @@ bool Controller::read(std::uint32_t address, std::span<std::uint8_t> to) noexcep
 bool Controller::write(std::uint32_t address, std::span<const std::uint8_t> from,
                        const std::uint8_t* mask) noexcept {
     bool accepted = false;
-    touched_ = true;
+    // The time that is distributed to all slaves does not concern the application.
+    const bool is_time = address >= registers::dc_system_time &&
+                         address + from.size() <= registers::dc_system_time + 8U;
+    touched_ |= !is_time;
     if (address < controller_facts::first_memory) {
         const std::size_t count =
             std::min<std::size_t>(from.size(), controller_facts::first_memory - address);

@@ -16,6 +16,7 @@
 #include "ethercat/esc/distributed_clock.hpp"
 #include "ethercat/esc/eeprom.hpp"
 #include "ethercat/esc/fmmus.hpp"
+#include "ethercat/esc/frame_interest.hpp"
 #include "ethercat/esc/pdi.hpp"
 #include "ethercat/esc/ports.hpp"
 #include "ethercat/esc/processing_unit.hpp"
@@ -23,6 +24,10 @@
 #include "ethercat/wire/frames.hpp"
 
 namespace hal::ethercat::esc {
+
+namespace register_facts {
+struct Range;
+}
 
 /// Properties of a controller. The defaults are those of a common one with two MII ports.
 struct Settings {
@@ -63,6 +68,13 @@ public:
     /// Stops; memory and configuration are lost. [realtime]
     void power_off() noexcept;
     bool powered() const noexcept { return powered_; }
+
+    /// Keeps from now on in `interest` which frames concern this controller; it must outlive it.
+    /// [setup]
+    void show_interest(FrameInterest& interest) noexcept {
+        interest = *interest_;
+        interest_ = &interest;
+    }
 
     // The line's side. [realtime]
 
@@ -117,7 +129,7 @@ public:
     bool write_sync_manager(unsigned number, std::span<const std::uint8_t> from) noexcept override;
     void acknowledge_repeat(unsigned number) noexcept override { sms_.acknowledge_repeat(number); }
     bool watchdog_expired() const noexcept override;
-    Pdi::Sync sync() const noexcept override { return dc_.sync(); }
+    const Pdi::Sync& sync() const noexcept override { return dc_.sync(); }
     std::int64_t last_frame_ns() const noexcept override { return last_frame_ns_; }
     std::uint8_t* memory(std::uint16_t address) noexcept override { return &memory_[address]; }
 
@@ -142,6 +154,9 @@ private:
     /// Does what a write to these registers means: keeps the bytes, clears counters, or passes them
     /// to the part of the controller that has the registers.
     void write_registers(std::uint16_t address, std::span<const std::uint8_t> from) noexcept;
+    void write_clock(const WrittenRegisters&) noexcept;
+    void write_controller(const WrittenRegisters&) noexcept;
+    void keep_parts(const WrittenRegisters&, std::span<const register_facts::Range>) noexcept;
     void keep(const WrittenRegisters& part) noexcept;
     void latch_times(const WrittenRegisters& write) noexcept;
     void write_sync_managers(const WrittenRegisters& write) noexcept;
@@ -155,6 +170,7 @@ private:
     void work_until(std::int64_t now_ns) noexcept;
     void run_application(std::int64_t now_ns) noexcept;
     void find_due() noexcept;
+    void update_interest() noexcept;
     void trigger_watchdog(std::int64_t now_ns) noexcept;
 
     Settings settings_;
@@ -167,6 +183,8 @@ private:
     Ports ports_;
     ProcessingUnit unit_;
     std::uint32_t ram_end_;
+    FrameInterest own_interest_;
+    FrameInterest* interest_ = &own_interest_;
     bool powered_ = false;
     bool emulates_ = false;
     bool control_pending_ = false;

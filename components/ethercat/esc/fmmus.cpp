@@ -29,6 +29,7 @@ void Fmmus::configure() noexcept {
         if ((u.physical_bit + u.bits + 7) / 8 > 0x10000) continue;
         first_ = std::min(first_, u.first_bit / 8);
         end_ = std::max(end_, (u.first_bit + u.bits + 7) / 8);
+        lowest_ = std::min(lowest_, u.physical_bit / 8);
         units_[used_++] = u;
     }
     const auto meet = [](const Unit& a, const Unit& b) {

@@ -31,6 +31,7 @@ public:
         used_ = 0;
         first_ = ~std::uint64_t{0};
         end_ = 0;
+        lowest_ = ~std::uint32_t{0};
         overlap_ = false;
     }
     /// Takes the settings at 0600h-06FFh.
@@ -40,6 +41,10 @@ public:
     bool hit(std::uint64_t address, std::size_t length) const noexcept {
         return address < end_ && address + length > first_;
     }
+    std::uint64_t first() const noexcept { return first_; }  ///< of the logical addresses
+    std::uint64_t last() const noexcept { return end_; }     ///< the one behind them
+    /// Returns whether an active FMMU maps memory below an address.
+    bool reaches_below(std::uint32_t address) const noexcept { return lowest_ < address; }
     const Unit* begin() const noexcept { return units_.data(); }
     const Unit* end() const noexcept { return units_.data() + used_; }
     /// Returns whether a byte is both read and written.
@@ -52,6 +57,7 @@ private:
     std::array<Unit, max> units_;  ///< active ones
     std::uint64_t first_ = ~std::uint64_t{0};
     std::uint64_t end_ = 0;
+    std::uint32_t lowest_ = ~std::uint32_t{0};  ///< physical address that is mapped
     bool overlap_ = false;
 };
 

@@ -36,6 +36,11 @@ int Line::add(SlaveOnLine slave) {
     Node node;
     node.controller =
         std::make_unique<Controller>(slave.controller, std::move(slave.sii), slave.application);
+    node.processing_ns = slave.controller.processing_ns;
+    node.forwarding_ns = slave.controller.forwarding_ns;
+    interests_.emplace_back();
+    node.interest = &interests_.back();
+    node.controller->show_interest(interests_.back());
     if (parent < 0) {
         node.cables[slave.port] = {at_end, static_cast<unsigned>(End::primary), slave.cable_ns};
         end_of(End::primary) = {number, slave.port, slave.cable_ns};
@@ -138,6 +143,7 @@ std::uint64_t Line::hits(int number) const noexcept {
 struct Line::Walk {
     std::span<std::uint8_t> frame;
     Controller::Frame content;
+    FrameAddresses addresses;
     std::int64_t time_ns = 0;
     bool ethercat = false;  ///< a frame with datagrams
     /// marked: a controller has seen the wrong check sequence
@@ -150,7 +156,9 @@ struct Line::Walk {
 void Line::advance(std::int64_t now_ns) noexcept {
     take_commands(now_ns);
     for (Node& n : nodes_) {
-        n.controller->advance(now_ns);
+        if (now_ns >= n.interest->due_ns) {
+            n.controller->advance(now_ns);
+        }
     }
 }
 
@@ -173,6 +181,7 @@ Line::Passage Line::process(std::span<std::uint8_t> frame, End end,
         std::max(static_cast<std::int64_t>(frame.size()), line_facts::smallest_frame) +
         line_facts::overhead;
     w.content = {{datagrams_.data(), count}, bytes * 8000 / speed_, number_};
+    w.addresses.read(w.content.datagrams);
     walk(w, end_of(end));
     w.out.copies = w.copies;
     return w.out;
@@ -193,12 +202,12 @@ void Line::walk(Walk& w, Connection from) noexcept {
             return;  // a port kept open without a cable
         }
         const auto slave = static_cast<std::size_t>(from.slave);
-        Controller& c = *nodes_[slave].controller;
-        if (!c.powered()) return;
+        const Node& node = nodes_[slave];
+        if (!node.interest->powered) return;
         if (!arrive(w, from.slave, from.port)) return;
-        if (!c.is_open(from.port)) {
+        if (!node.is_open(from.port)) {
             if (!w.corrupted) {
-                c.frame_at_closed_port(from.port);
+                node.controller->frame_at_closed_port(from.port);
             }
             return;
         }
@@ -209,7 +218,7 @@ void Line::walk(Walk& w, Connection from) noexcept {
 }
 
 /// Applies the disturbances of a receiver (-1: the master). Returns false if the frame is lost.
-bool Line::arrive(Walk& w, int slave, unsigned port) noexcept {
+bool Line::disturb(Walk& w, int slave, unsigned port) noexcept {
     for (std::size_t i = 0; i < disturbance_count_; ++i) {
         Disturbed& d = disturbances_[i];
         if (d.what.slave != slave || d.what.port != port || d.hits >= d.what.count) continue;
@@ -229,10 +238,19 @@ bool Line::arrive(Walk& w, int slave, unsigned port) noexcept {
             break;
         }
     }
+    return true;
+}
+
+/// Lets the frame arrive at a receiver (-1: the master). Returns false if it is lost.
+bool Line::arrive(Walk& w, int slave, unsigned port) noexcept {
+    if (disturbance_count_ != 0 && !disturb(w, slave, port)) return false;
     if (slave < 0) return true;
-    Controller& c = *nodes_[static_cast<std::size_t>(slave)].controller;
-    c.arrive(port, w.time_ns, w.content.number);
+    const Node& node = nodes_[static_cast<std::size_t>(slave)];
+    if (w.addresses.need_arrival(*node.interest)) {
+        node.controller->arrive(port, w.time_ns, w.content.number);
+    }
     if (w.corrupted) {
+        Controller& c = *node.controller;
         if (w.marked) {
             c.error_counters().count_forwarded(port);
         } else {
@@ -245,31 +263,33 @@ bool Line::arrive(Walk& w, int slave, unsigned port) noexcept {
 
 /// Lets the frame pass a processing unit. Returns false if it ends there.
 bool Line::pass_unit(Walk& w, std::size_t slave) noexcept {
-    Controller& c = *nodes_[slave].controller;
+    const Node& node = nodes_[slave];
     if (w.corrupted) {
-        c.error_counters().count_unit_error();
+        node.controller->error_counters().count_unit_error();
     } else if (w.ethercat) {
         w.frame[6] |= 0x02;  // the source address becomes a local one
-        c.execute(w.content, w.time_ns);
-    } else if (c.destroys_foreign_frames()) {
-        c.error_counters().count_unit_error();
+        if (w.addresses.concern(*node.interest, w.time_ns + w.content.length_ns)) {
+            node.controller->execute(w.content, w.time_ns);
+        }
+    } else if (node.controller->destroys_foreign_frames()) {
+        node.controller->error_counters().count_unit_error();
         return false;
     }
-    w.time_ns += c.settings().processing_ns;
+    w.time_ns += node.processing_ns;
     return true;
 }
 
 /// Takes a frame through a controller from one of its ports. Returns the port where it leaves, -1
 /// if it is destroyed.
 int Line::exit_of(Walk& w, std::size_t slave, unsigned port) noexcept {
-    const Controller& c = *nodes_[slave].controller;
+    const Node& node = nodes_[slave];
     if (port != 0) {
-        w.time_ns += c.settings().forwarding_ns;
+        w.time_ns += node.forwarding_ns;
     } else if (!pass_unit(w, slave)) {
         return -1;
     }
     for (unsigned next = line_facts::next_port(port);; next = line_facts::next_port(next)) {
-        if (c.is_open(next)) return static_cast<int>(next);
+        if (node.is_open(next)) return static_cast<int>(next);
         if (next != 0) continue;
         // Port 0 is closed: the frame comes from behind a break. On its second pass it circulates,
         // and is destroyed.

@@ -14,6 +14,7 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
+#include <deque>
 #include <memory>
 #include <span>
 #include <vector>
@@ -153,7 +154,14 @@ private:
     };
     struct Node {
         std::unique_ptr<Controller> controller;
+        const FrameInterest* interest = nullptr;
+        std::int64_t processing_ns = 0;
+        std::int64_t forwarding_ns = 0;
         std::array<Connection, ports> cables;
+
+        bool is_open(unsigned port) const noexcept {
+            return (interest->open_ports >> port & 1) != 0;
+        }
     };
     struct Walk;
 
@@ -162,12 +170,14 @@ private:
     void update_links(std::size_t slave) noexcept;
     void update_port(std::size_t slave, unsigned port) noexcept;
     Connection& end_of(End end) noexcept { return ends_[static_cast<std::size_t>(end)]; }
+    bool disturb(Walk&, int slave, unsigned port) noexcept;
     bool arrive(Walk&, int slave, unsigned port) noexcept;
     bool pass_unit(Walk&, std::size_t slave) noexcept;
     int exit_of(Walk&, std::size_t slave, unsigned port) noexcept;
     void walk(Walk&, Connection from) noexcept;
 
     std::vector<Node> nodes_;
+    std::deque<FrameInterest> interests_;  ///< of the nodes, close together; they stay in place
     std::array<Connection, 2> ends_;
     std::uint32_t speed_ = 100;
     std::uint64_t number_ = 0;

@@ -65,7 +65,7 @@ public:
         std::uint64_t last_pulse_dc_ns = 0;  ///< the same, system time
     };
     /// Returns the state of SYNC0 and SYNC1. [realtime]
-    virtual Sync sync() const noexcept = 0;
+    virtual const Sync& sync() const noexcept = 0;
     /// Returns when the newest process data frame passed. [realtime]
     virtual std::int64_t last_frame_ns() const noexcept = 0;
     /// Reads or writes a register or memory of the controller, without the rules of sync managers.
@@ -87,6 +87,9 @@ public:
     /// SYNC1 pulse, when the watchdog expires, and at least every millisecond of traffic, in order
     /// of time. [realtime]
     virtual void run(Pdi&, std::int64_t now_ns) noexcept = 0;
+    /// Returns whether time alone brings it further: then it runs at frames that do not concern the
+    /// slave, too. [realtime]
+    virtual bool waits() const noexcept { return true; }
 };
 
 }  // namespace hal::ethercat::esc

@@ -31,6 +31,7 @@ public:
     /// Opens and closes the ports as loop control and links demand. Returns whether DL status
     /// changed.
     bool update(bool eeprom_loaded) noexcept;
+    std::uint8_t open() const noexcept { return open_; }  ///< Returns a bit for each open port.
     /// Returns whether frames leave at a port.
     bool is_open(unsigned port) const noexcept { return (open_ >> port & 1) != 0; }
 

@@ -26,26 +26,34 @@ struct CommandRow {
     bool writes() const noexcept { return access != Access::read; }
 };
 constexpr CommandRow command_rows[] = {
+    {Command::nop, Addressing::position, Access::read},  // not executed
     {Command::aprd, Addressing::position, Access::read},
     {Command::apwr, Addressing::position, Access::write},
     {Command::aprw, Addressing::position, Access::read_and_write},
-    {Command::armw, Addressing::position, Access::read_or_write},
     {Command::fprd, Addressing::station, Access::read},
     {Command::fpwr, Addressing::station, Access::write},
     {Command::fprw, Addressing::station, Access::read_and_write},
-    {Command::frmw, Addressing::station, Access::read_or_write},
     {Command::brd, Addressing::broadcast, Access::read},
     {Command::bwr, Addressing::broadcast, Access::write},
     {Command::brw, Addressing::broadcast, Access::read_and_write},
     {Command::lrd, Addressing::logical, Access::read},
     {Command::lwr, Addressing::logical, Access::write},
     {Command::lrw, Addressing::logical, Access::read_and_write},
+    {Command::armw, Addressing::position, Access::read_or_write},
+    {Command::frmw, Addressing::station, Access::read_or_write},
 };
+constexpr bool in_order_of_their_numbers() {
+    for (std::size_t n = 0; n < std::size(command_rows); ++n) {
+        if (static_cast<std::size_t>(command_rows[n].command) != n) return false;
+    }
+    return true;
+}
+static_assert(in_order_of_their_numbers());
 
 const CommandRow* row_of(Command command) noexcept {
-    const auto row = std::find_if(std::begin(command_rows), std::end(command_rows),
-                                  [command](const CommandRow& r) { return r.command == command; });
-    return row != std::end(command_rows) ? row : nullptr;
+    const auto number = static_cast<std::size_t>(command);
+    const bool executed = command != Command::nop && number < std::size(command_rows);
+    return executed ? &command_rows[number] : nullptr;
 }
 
 /// Returns whether the unit has a command.

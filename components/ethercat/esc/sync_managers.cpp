@@ -66,8 +66,11 @@ void SyncManagers::activate(unsigned number, bool on) noexcept {
     enabled_ = fits ? enabled_ | 1U << number : enabled_ & ~(1U << number);
 }
 
-void SyncManagers::show_status() noexcept {
-    for (unsigned n = 0; n < count_; ++n) {
+void SyncManagers::show_status(std::uint16_t address, std::size_t length) noexcept {
+    const unsigned from = std::max<unsigned>(address, registers::sync_manager);
+    const auto end = static_cast<unsigned>(address + length);
+    for (unsigned n = (from - registers::sync_manager) / sm_bytes::size;
+         n < count_ && registers::sync_manager_at(n) < end; ++n) {
         const Unit& u = units_[n];
         unsigned status = static_cast<unsigned>(u.fresh) | static_cast<unsigned>(u.read_event) << 1;
         if (u.mailbox) {

@@ -25,8 +25,8 @@ public:
 
     /// Takes a write of the master to 0800h-087Fh. Returns whether an activation changed.
     bool configure(std::uint16_t address, std::span<const std::uint8_t> data) noexcept;
-    /// Updates the status bytes (0805h...) before they are read.
-    void show_status() noexcept;
+    /// Updates the status bytes (0805h...) in a range before they are read.
+    void show_status(std::uint16_t address, std::size_t length) noexcept;
 
     /// Reads memory for the master: the rules apply where a sync manager is enabled. Returns
     /// whether at least one byte was accepted.

@@ -12,6 +12,7 @@
 #include <string>
 
 #include "ethercat/master/setup.hpp"
+#include "ethercat/wire/byte_order.hpp"
 #include "hal/any_pin.hpp"
 #include "hal/pin_codec.hpp"
 
@@ -58,7 +59,7 @@ public:
     void show(std::span<const std::span<std::uint8_t>> areas) noexcept {
         std::uint32_t invalid = 0;
         outs_.each([areas, &invalid]<class T>(Out<T>& pin, const Place& p) noexcept {
-            const T value = p.codec.decode<T>(read_bits(areas[p.area], p.at, p.codec.bits()));
+            const T value = p.codec.decode<T>(p.read(areas[p.area]));
             if constexpr (std::is_same_v<T, double>) {
                 if (!std::isfinite(value)) {
                     ++invalid;
@@ -87,7 +88,7 @@ public:
                     return;  // the last one stays
                 }
             }
-            write_bits(areas[p.area], p.at, p.codec.bits(), p.codec.encode(value));
+            p.write(areas[p.area], p.codec.encode(value));
         });
         taken_invalid_.fetch_add(invalid, std::memory_order_relaxed);
         return invalid != 0;
@@ -100,6 +101,27 @@ private:
         PinCodec codec;
         double scale = 1.0;
         double offset = 0.0;
+
+        /// Returns the size of an entry that fills 16 or 32 bits at a byte boundary, as most do;
+        /// 0: another one.
+        unsigned plain_bits() const noexcept {
+            const unsigned bits = codec.bits();
+            return at % 8 == 0 && (bits == 16 || bits == 32) ? bits : 0U;
+        }
+        std::uint64_t read(std::span<const std::uint8_t> data) const noexcept {
+            switch (plain_bits()) {
+            case 16: return get<std::uint16_t>(&data[at / 8]);
+            case 32: return get<std::uint32_t>(&data[at / 8]);
+            default: return read_bits(data, at, codec.bits());
+            }
+        }
+        void write(std::span<std::uint8_t> data, std::uint64_t value) const noexcept {
+            switch (plain_bits()) {
+            case 16: return put(&data[at / 8], static_cast<std::uint16_t>(value));
+            case 32: return put(&data[at / 8], static_cast<std::uint32_t>(value));
+            default: return write_bits(data, at, codec.bits(), value);
+            }
+        }
     };
 
     /// Returns true for a real type that fills the entry: only then the cycle reads and writes the

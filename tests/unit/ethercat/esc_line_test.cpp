@@ -26,6 +26,26 @@ TEST_F(Line, Frame_takes_the_delays_of_cables_and_slaves) {
     EXPECT_EQ(w.out.first_bit_ns - w.now_ns, 50 + 640 + 50 + 640 + 50 + 600 + 50);
 }
 
+TEST_F(Line, Frame_runs_the_firmware_that_it_concerns_and_that_which_waits) {
+    constexpr std::uint16_t alias = 7;
+    row(3);
+    ASSERT_EQ(w.line.add({.sii = image(alias), .application = &firmware[3]}), 3);
+    firmware[2].waiting = firmware[3].waiting = false;
+    w.line.power_on(0);
+    for (unsigned i = 0; i < 4; ++i) {
+        w.write<std::uint16_t>(i, registers::station_address,
+                               static_cast<std::uint16_t>(0x1001 + i));
+    }
+    const auto runs_before = firmware;
+    w.gap_ns = 300'000;
+    EXPECT_EQ(w.send(Command::fprd, at_station(0x1003, registers::al_status), {0, 0}), 1);
+    EXPECT_EQ(firmware[0].runs, runs_before[0].runs + 1) << "it waits, and did not run for 200 us";
+    EXPECT_EQ(firmware[2].runs, runs_before[2].runs + 1) << "it is addressed";
+    EXPECT_EQ(firmware[3].runs, runs_before[3].runs);
+    w.write<std::uint8_t>(3, registers::dl_alias_enable, 1);
+    EXPECT_EQ(w.send(Command::fprd, at_station(alias, registers::al_status), {0, 0}), 1);
+}
+
 TEST_F(Line, Dl_status_shows_links_and_closed_loops) {
     row(2);
     w.line.power_on(0);

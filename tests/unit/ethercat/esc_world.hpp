@@ -24,7 +24,9 @@ struct Firmware : esc::Application {
     std::vector<std::uint8_t> input;  ///< written to sync manager 3 at each run
     bool follow = true;
     bool trips = false;
+    bool waiting = true;
 
+    bool waits() const noexcept override { return waiting; }
     void power_on(esc::Pdi&) noexcept override { ++starts; }
     void run(esc::Pdi& pdi, std::int64_t now_ns) noexcept override {
         ++runs;
