@@ -13,10 +13,11 @@
 
 namespace hal::estimation {
 
+/// The measurements of one filter, in the order of its channels.
 class Channels {
 public:
-    /// `z-N`, `age-N`, `new-N`; with names NAME, `NAME-age`, `NAME-new`. In a component's
-    /// constructor.
+    /// Declares `z-N`, `age-N` and `new-N` of each measurement; with names NAME, `NAME-age` and
+    /// `NAME-new`. In a component's constructor. [setup]
     Channels(hal::Component& component, Eigen::Index count,
              const std::vector<std::string>& names = {})
         : gate(component, "gate",
@@ -32,16 +33,9 @@ public:
           renewals(component, "renewals",
                    "number of times the covariance became invalid and was reset") {
         for (Eigen::Index i = 0; i < count; ++i) {
-            const std::string number = std::to_string(i);
-
-            const std::string what =
-                names.empty() ? "measurement " + number : names[static_cast<std::size_t>(i)];
-            const auto name = [&](const char* kind) {
-                return names.empty() ? std::string(kind) + "-" + number
-                                     : what + (*kind == 'z' ? "" : std::string("-") + kind);
-            };
-            rows_.emplace_back(
-                std::make_unique<Row>(component, name("z"), name("age"), name("new"), what));
+            const auto index = static_cast<std::size_t>(i);
+            const PinNames pins = names.empty() ? numbered(std::to_string(i)) : named(names[index]);
+            rows_.emplace_back(std::make_unique<Row>(component, pins));
         }
         reported_ = Vector::Zero(count);
         hal::Retained(
@@ -49,7 +43,7 @@ public:
             {{"reported", reported_}, {"silent-s", silent_s_}, {"used", used_}, {"ever", ever_}});
     }
 
-    /// Gives `past` what there is in this cycle. [realtime]
+    /// Gives the measurements of this cycle to `past`. [realtime]
     template <class Filter>
     void feed(Filter& past, hal::Cycle cycle) noexcept {
         for (std::size_t i = 0; i < rows_.size(); ++i) {
@@ -62,56 +56,75 @@ public:
             }
         }
     }
-    /// The same for measurements that make sense together only: `mix` times all of them. [realtime]
+    /// The same for measurements whose noises are correlated: the rows of `decorrelation` times all
+    /// of them are independent, so that a cycle without one of them is skipped. [realtime]
     template <class Filter>
-    void tell_whole(Filter& past, hal::Cycle cycle, const Matrix& mix) noexcept {
-        bool all = true;
-        bool any = false;
-        bool numbers = true;
+    void feed_decorrelated(Filter& past, hal::Cycle cycle, const Matrix& decorrelation) noexcept {
+        std::size_t fresh = 0;
+        bool all_finite = true;
         for (std::size_t i = 0; i < rows_.size(); ++i) {
-            const bool fresh = rows_[i]->fresh;
-            all = all && fresh;
-            any = any || fresh;
-            reported_(static_cast<Eigen::Index>(i)) = rows_[i]->z;
-            numbers = numbers && std::isfinite(rows_[i]->z);
+            const double z = rows_[i]->z;
+            reported_(static_cast<Eigen::Index>(i)) = z;
+            all_finite = all_finite && std::isfinite(z);
+            if (rows_[i]->fresh) {
+                ++fresh;
+            }
         }
-        if (!any) return;
-        if (!all || !numbers) {
+        if (fresh == 0) return;
+        if (fresh < rows_.size() || !all_finite) {
             skipped = skipped + 1;
             return;
         }
-        Vector mixed;
-        multiply(mixed, mix, reported_);
-        bool known = true;
-        for (Eigen::Index i = 0; i < mixed.size(); ++i) {
-            known = past.add(i, mixed(i), cycles(*rows_[0], cycle)) && known;
+        Vector independent;
+        multiply(independent, decorrelation, reported_);
+        const std::int64_t age = cycles(*rows_[0], cycle);
+        bool all_in_history = true;
+        for (Eigen::Index i = 0; i < independent.size(); ++i) {
+            const bool in_history = past.add(i, independent(i), age);
+            all_in_history = all_in_history && in_history;
         }
-        if (!known) {
+        if (!all_in_history) {
             late = late + 1;
         }
     }
-    /// Shows what became of it. [realtime]
+    /// Sets the pins after the filter's step. [realtime]
     template <class Filter>
-    void count(const Filter& past, hal::Cycle cycle) noexcept {
+    void show_outcome(const Filter& past, hal::Cycle cycle) noexcept {
         outliers = past.outliers;
         renewals = past.renewals;
-        silent_s_ = past.used != used_ ? 0.0 : silent_s_ + cycle.seconds();
-        ever_ = ever_ || past.used != used_;
+        if (past.used != used_) {
+            ever_ = true;
+            silent_s_ = 0.0;
+        } else {
+            silent_s_ = silent_s_ + cycle.seconds();
+        }
         used_ = past.used;
-        valid = ever_ && !(timeout > 0.0 && silent_s_ > timeout);
+        const bool timed_out = timeout > 0.0 && silent_s_ > timeout;
+        valid = ever_ && !timed_out;
     }
 
 private:
+    struct PinNames {
+        std::string value, age, fresh;
+        std::string doc;  ///< of the value
+    };
+    static PinNames numbered(const std::string& number) {
+        return {"z-" + number, "age-" + number, "new-" + number, "measurement " + number};
+    }
+    static PinNames named(const std::string& name) {
+        return {name, name + "-age", name + "-new", name};
+    }
+
     struct Row {
-        Row(hal::Component& component, const std::string& z_name, const std::string& age_name,
-            const std::string& new_name, const std::string& what)
-            : z(component, z_name.c_str(), what.c_str()),
-              age(component, age_name.c_str(), ("age of " + what).c_str(), {.unit = "s"}),
-              fresh(component, new_name.c_str(),
-                    ("TRUE: " + what + " is new in this cycle").c_str(), {.initial = true}) {}
+        Row(hal::Component& component, const PinNames& names)
+            : z(component, names.value.c_str(), names.doc.c_str()),
+              age(component, names.age.c_str(), ("age of " + names.doc).c_str(), {.unit = "s"}),
+              fresh(component, names.fresh.c_str(),
+                    ("TRUE: " + names.doc + " is new in this cycle").c_str(), {.initial = true}) {}
         hal::In<double> z, age;
         hal::In<bool> fresh;
     };
+    /// The age of a measurement in cycles, rounded; a negative age is 0.
     static std::int64_t cycles(const Row& row, hal::Cycle cycle) noexcept {
         const double count = row.age / cycle.seconds();
         if (!(count > 0.5)) return 0;
@@ -120,9 +133,9 @@ private:
 
     std::vector<std::unique_ptr<Row>> rows_;
     Vector reported_;
-    double silent_s_ = 0.0;
+    double silent_s_ = 0.0;  // since a measurement was used
     std::uint32_t used_ = 0;
-    bool ever_ = false;
+    bool ever_ = false;  // a measurement was used
 
 public:
     hal::In<double> gate;

@@ -74,9 +74,9 @@ public:
                 f_(i, j) = next[at].slope[static_cast<std::size_t>(j)];
             }
         }
-        spread(to.p, f_, from.p, q_);
+        propagate_covariance(to.p, f_, from.p, q_);
     }
-    Fate measure(Moment& moment, Eigen::Index channel, double gate) noexcept {
+    Correction measure(Moment& moment, Eigen::Index channel, double gate) noexcept {
         const Model::Measure& m = model_.measures[static_cast<std::size_t>(channel)];
         const std::size_t n = model_.states.size();
         for (std::size_t i = 0; i < n; ++i) {
@@ -87,17 +87,17 @@ public:
             values_[max_slopes + i] = Dual{moment.u(static_cast<Eigen::Index>(i))};
         }
         const Dual expected = m.value(values_.data(), n);
-        double off = moment.z(channel) - expected.value;
+        double innovation = moment.z(channel) - expected.value;
         if (m.wrap > 0.0) {
-            off = std::remainder(off, m.wrap);
+            innovation = std::remainder(innovation, m.wrap);
         }
         Vector row(static_cast<Eigen::Index>(n));
         for (std::size_t i = 0; i < n; ++i) {
             row(static_cast<Eigen::Index>(i)) = expected.slope[i];
         }
         // a formula that has no value here
-        if (!std::isfinite(off) || !finite(row)) return Fate::outlier;
-        return correct(moment.x, moment.p, row, off, m.sigma * m.sigma, gate);
+        if (!std::isfinite(innovation) || !finite(row)) return Correction::outlier;
+        return correct(moment.x, moment.p, row, innovation, m.sigma * m.sigma, gate);
     }
 
 private:
@@ -174,7 +174,7 @@ public:
         past_.advance(input_);
         channels_.feed(past_, cycle);
         past_.settle(std::fmax(channels_.gate, 0.0));
-        channels_.count(past_, cycle);
+        channels_.show_outcome(past_, cycle);
         const Moment& now = past_.now();
         for (std::size_t i = 0; i < x_.size(); ++i) {
             const auto at = static_cast<Eigen::Index>(i);

@@ -93,25 +93,25 @@ struct Identify : hal::Component {
             fail(Failure::not_a_number);
         }
         time_ += dt;
-        switch (now_) {
-        case Phase::settling: rest(y); break;
-        case Phase::step: watch(y, dt); break;
-        case Phase::relay: swing(y, dt); break;
+        switch (state_) {
+        case Phase::settling: measure_rest(y); break;
+        case Phase::step: record_step(y, dt); break;
+        case Phase::relay: run_relay(y, dt); break;
         default: break;
         }
         const double given = bias + excitation();
         output = std::isfinite(given) ? given : 0.0;
-        phase = static_cast<std::uint32_t>(now_);
+        phase = static_cast<std::uint32_t>(state_);
         active = running();
     }
 
 private:
     bool running() const noexcept {
-        return now_ == Phase::settling || now_ == Phase::step || now_ == Phase::relay;
+        return state_ == Phase::settling || state_ == Phase::step || state_ == Phase::relay;
     }
     double excitation() const noexcept {
-        if (now_ == Phase::step) return amplitude;
-        if (now_ != Phase::relay) return 0.0;
+        if (state_ == Phase::step) return amplitude;
+        if (state_ != Phase::relay) return 0.0;
         return high_ ? amplitude.get() : -amplitude;
     }
 
@@ -132,18 +132,15 @@ private:
         high_ = y < setpoint;
         last_switch_ = -1.0;
         swings_ = 0;
-        even_ = 0;
+        compared_ = 0;
         top_ = y;
         bottom_ = y;
     }
     void enter(Phase next) noexcept {
-        now_ = next;
+        state_ = next;
         time_ = 0.0;
-        count_ = 0;
-        thin_ = 1;
-        skip_ = 0;
-        quiet_sum_ = quiet_square_ = 0.0;
-        quiet_count_ = 0.0;
+        forget_samples();
+        quiet_sum_ = quiet_square_ = quiet_count_ = 0.0;
         late_sum_ = late_count_ = 0.0;
         if (next != Phase::done && next != Phase::failed) {
             failure = 0;
@@ -155,25 +152,28 @@ private:
     }
     /// The second half of the settling time gives the steady state and the noise; its two halves
     /// give the drift.
-    void rest(double y) noexcept {
+    void measure_rest(double y) noexcept {
         if (time_ > 0.5 * settle_time) {
-            quiet_sum_ += y - first_;
-            quiet_square_ += (y - first_) * (y - first_);
-
+            const double deviation = y - first_;
+            quiet_sum_ += deviation;
+            quiet_square_ += deviation * deviation;
             quiet_count_ += 1.0;
             if (time_ > 0.75 * settle_time) {
-                late_sum_ += y - first_;
+                late_sum_ += deviation;
                 late_count_ += 1.0;
             }
         } else {
             first_ = y;
         }
         if (time_ < settle_time) return;
-        const double mean = quiet_count_ > 0.0 ? quiet_sum_ / quiet_count_ : 0.0;
-        start_ = first_ + mean;
-        noise_ = quiet_count_ > 0.0
-                     ? std::sqrt(std::fmax(quiet_square_ / quiet_count_ - mean * mean, 0.0))
-                     : 0.0;
+        start_ = first_;
+        noise_ = 0.0;
+        if (quiet_count_ > 0.0) {
+            const double mean = quiet_sum_ / quiet_count_;
+            const double variance = quiet_square_ / quiet_count_ - mean * mean;
+            start_ = first_ + mean;
+            noise_ = std::sqrt(std::fmax(variance, 0.0));
+        }
         find_drift();
         enter(Phase::step);
     }
@@ -194,77 +194,103 @@ private:
         const double longest = 0.25 * step_time;
         return (std::fabs(drift_) - 3.0 * drift_noise_) * longest <= 0.02 * std::fabs(end);
     }
+    /// Keeps one of `decimation_` samples. When the memory is full, every second one of it remains
+    /// and the decimation doubles.
     void keep(double y) noexcept {
-        if (skip_++ % thin_ != 0) return;
-        // full: every second one is kept, and from now on half as many are taken
+        const std::size_t sample = samples_seen_++;
+        if (sample % decimation_ != 0) return;
         if (count_ == kept_.size()) {
             for (std::size_t i = 0; 2 * i < count_; ++i) {
                 kept_[i] = kept_[2 * i];
             }
             count_ = (count_ + 1) / 2;
-            thin_ *= 2;
+            decimation_ *= 2;
         }
-        if ((skip_ - 1) % thin_ == 0) {
+        if (sample % decimation_ == 0) {
             kept_[count_++] = y;
         }
     }
-    void watch(double y, double dt) noexcept {
+    void forget_samples() noexcept {
+        count_ = 0;
+        decimation_ = 1;
+        samples_seen_ = 0;
+    }
+    void record_step(double y, double dt) noexcept {
         keep(y - start_);
         if (time_ >= step_time) {
-            evaluate(dt * static_cast<double>(thin_));
+            evaluate_step(dt * static_cast<double>(decimation_));
         }
     }
-    /// Areas of the step response (K. Åström, T. Hägglund, *PID Controllers: Theory, Design, and
-    /// Tuning*, 2.4): with the end value y1,
-    ///     A0 = integral of y1 - y = y1 (T + L),   A1 = integral of y up to T + L = y1 T / e
-    void evaluate(double h) noexcept {
-        const std::size_t n = count_;
-        const std::size_t tail = std::max<std::size_t>(n / 10, 1);
-        if (n < 20 || amplitude == 0.0) return fail(Failure::no_answer);
-        double end = 0.0;
-        double before = 0.0;
-        for (std::size_t i = n - tail; i < n; ++i) {
-            end += kept_[i] / static_cast<double>(tail);
-        }
-        for (std::size_t i = n - 2 * tail; i < n - tail; ++i) {
-            before += kept_[i] / static_cast<double>(tail);
-        }
-        if (!(std::fabs(end) > 4.0 * noise_) || end == 0.0) {
-            return fail(end == 0.0 ? Failure::no_answer : Failure::noisy);
-        }
-        const double uncertain = noise_ * std::sqrt(2.0 / static_cast<double>(tail));
-        if (std::fabs(end - before) > 0.01 * std::fabs(end) + 3.0 * uncertain) {
+    /// The result of a step experiment: a first-order model, its fit, and the gains proposed for
+    /// it. `h` is the time between kept samples.
+    void evaluate_step(double h) noexcept {
+        if (count_ < min_step_samples || amplitude == 0.0) return fail(Failure::no_answer);
+        const std::size_t tenth = count_ / 10;
+        const double end = mean(count_ - tenth, count_);
+        const double end_before = mean(count_ - 2 * tenth, count_ - tenth);
+        if (end == 0.0) return fail(Failure::no_answer);
+        if (!(std::fabs(end) > 4.0 * noise_)) return fail(Failure::noisy);
+        const double noise_of_means = noise_ * std::sqrt(2.0 / static_cast<double>(tenth));
+        if (std::fabs(end - end_before) > 0.01 * std::fabs(end) + 3.0 * noise_of_means) {
             return fail(Failure::too_long);
         }
         if (!was_settled(end)) return fail(Failure::too_long);
+        const FirstOrder model = first_order_by_areas(end, h);
+        gain = model.end / amplitude;
+        time_constant = model.time_constant;
+        dead_time = model.dead_time;
+        fit = fit_of(model, h);
+        propose(model.end / amplitude, model.time_constant, std::fmax(model.dead_time, h));
+    }
+    double mean(std::size_t begin, std::size_t end) const noexcept {
+        const auto count = static_cast<double>(end - begin);
+        double mean = 0.0;
+        for (std::size_t i = begin; i < end; ++i) {
+            mean += kept_[i] / count;
+        }
+        return mean;
+    }
+
+    /// A step response: end (1 - e^(-(t - dead_time) / time_constant)) from dead_time on.
+    struct FirstOrder {
+        double end;
+        double time_constant;
+        double dead_time;
+        double at(double time) const noexcept {
+            const double since = time - dead_time;
+            return since > 0.0 ? -end * std::expm1(-since / time_constant) : 0.0;
+        }
+    };
+    /// Areas of the step response (K. Åström, T. Hägglund, *PID Controllers: Theory, Design, and
+    /// Tuning*, 2.4): with the end value y1,
+    ///     A0 = integral of y1 - y = y1 (T + L),   A1 = integral of y up to T + L = y1 T / e
+    /// T + L is the average residence time.
+    FirstOrder first_order_by_areas(double end, double h) const noexcept {
         double a0 = 0.0;
-        double a1 = 0.0;
-        double at = 0.0;
-        for (std::size_t i = 0; i < n; ++i) {
+        for (std::size_t i = 0; i < count_; ++i) {
             a0 += (end - kept_[i]) * h;
         }
-        const double both = a0 / end;
-        for (std::size_t i = 0; i < n && at < both; ++i, at += h) {
-            a1 += kept_[i] * std::fmin(h, both - at);
+        const double residence_time = a0 / end;
+        double a1 = 0.0;
+        double time = 0.0;
+        for (std::size_t i = 0; i < count_ && time < residence_time; ++i) {
+            a1 += kept_[i] * std::fmin(h, residence_time - time);
+            time += h;
         }
         const double t = std::fmax(std::numbers::e * a1 / end, h);
-        const double dead = std::fmax(both - t, 0.0);
-
-        const double k = end / amplitude;
-        double off = 0.0;
-        double all = 0.0;
-        for (std::size_t i = 0; i < n; ++i) {
-            const double since = static_cast<double>(i) * h - dead,
-                         model = since > 0.0 ? -end * std::expm1(-since / t) : 0.0;
-            off += (kept_[i] - model) * (kept_[i] - model);
-
-            all += (kept_[i] - end) * (kept_[i] - end);
+        return {end, t, std::fmax(residence_time - t, 0.0)};
+    }
+    /// The part of the response that the model explains, at most 1.
+    double fit_of(const FirstOrder& model, double h) const noexcept {
+        double residual_square = 0.0;
+        double total_square = 0.0;
+        for (std::size_t i = 0; i < count_; ++i) {
+            const double residual = kept_[i] - model.at(static_cast<double>(i) * h);
+            const double from_end = kept_[i] - model.end;
+            residual_square += residual * residual;
+            total_square += from_end * from_end;
         }
-        gain = k;
-        time_constant = t;
-        dead_time = dead;
-        fit = all > 0.0 ? 1.0 - std::sqrt(off / all) : 0.0;
-        propose(k, t, std::fmax(dead, h));
+        return total_square > 0.0 ? 1.0 - std::sqrt(residual_square / total_square) : 0.0;
     }
     /// S. Skogestad, *Simple analytic rules for model reduction and PID controller tuning*, J.
     /// Process Control 13, 2003 (SIMC).
@@ -280,85 +306,72 @@ private:
     /// The relay makes the loop oscillate near the frequency where the plant shifts the phase by
     /// 180 degrees (K. Åström, T. Hägglund, *Automatic Tuning of Simple Regulators with
     /// Specifications on Phase and Amplitude Margins*, Automatica 20, 1984).
-    void swing(double y, double dt) noexcept {
+    void run_relay(double y, double dt) noexcept {
         top_ = std::fmax(top_, y);
         bottom_ = std::fmin(bottom_, y);
         const double band = std::fabs(hysteresis);
-        const bool up = high_ ? y < setpoint + band : y < setpoint - band;
-        if (up && !high_) {
-            turned(y, dt);
-        } else if (!up && high_ && even_ < periods) {
-            downs_[even_] = time_;
+        const bool high = high_ ? y < setpoint + band : y < setpoint - band;
+        if (high && !high_) {
+            finish_period(y, dt);
+        } else if (!high && high_ && compared_ < periods) {
+            downs_[compared_] = time_;
         }
-        high_ = up;
-        if (now_ != Phase::relay) return;
+        high_ = high;
+        if (state_ != Phase::relay) return;
         keep(y - setpoint);
         if (time_ > std::fmax(step_time, 0.0)) {
             fail(Failure::no_oscillation);
         }
     }
-    /// Once a period; the first three are left out, four that agree within 10 % make the result.
-    void turned(double y, double dt) noexcept {
+    /// Called when the output is switched up, once a period. The first periods are left out;
+    /// `periods` of them that agree within 10 % make the result.
+    void finish_period(double y, double dt) noexcept {
+        const bool has_begun = last_switch_ >= 0.0;
         const double period = time_ - last_switch_;
-        const bool first = last_switch_ < 0.0;
         last_switch_ = time_;
-        if (!first && ++swings_ > 3) {
-            shortest_ = even_ == 0 ? period : std::fmin(shortest_, period);
-
-            max_ = even_ == 0 ? period : std::fmax(max_, period);
-            if (++even_ == periods) {
-                if (max_ <= 1.1 * shortest_) return conclude(dt);
-                even_ = 0;
+        if (has_begun && ++swings_ > transient_periods) {
+            compare(period);
+            if (compared_ == periods) {
+                if (longest_ <= 1.1 * shortest_) return evaluate_relay(dt);
+                compared_ = 0;
             }
         }
-        // what is kept begins with this switch
-        if (even_ == 0) {
-            count_ = 0;
-            thin_ = 1;
-            skip_ = 0;
+        if (compared_ == 0) {  // what is kept begins with this switch
+            forget_samples();
             top_ = bottom_ = y;
         }
-        ups_[even_] = time_;
+        ups_[compared_] = time_;
+    }
+    void compare(double period) noexcept {
+        if (compared_ == 0) {
+            shortest_ = period;
+            longest_ = period;
+        }
+        shortest_ = std::fmin(shortest_, period);
+        longest_ = std::fmax(longest_, period);
+        ++compared_;
     }
     /// The plant is linear, so the first harmonics of answer and output, over all four periods, are
     /// its response at that frequency, whatever the shape of the swing (C. Hang, K. Åström, Q.
     /// Wang, *Relay feedback auto-tuning of process controllers*, J. Process Control 12, 2002).
     /// From there to half a turn of the phase it is taken for an integrator with a dead time, which
     /// is what plants are like in that place.
-    void conclude(double dt) noexcept {
-        using Complex = std::complex<double>;
-        const double h = dt * static_cast<double>(thin_);
-        const double begin = ups_[0];
-        const double span = time_ - begin;
-
-        const double w = 2.0 * std::numbers::pi * periods / span;
+    void evaluate_relay(double dt) noexcept {
+        const double span = time_ - ups_[0];
         if (!(0.5 * (top_ - bottom_) > std::fabs(hysteresis))) return fail(Failure::noisy);
         if (span < min_period_cycles * periods * dt) return fail(Failure::noisy);
-        const auto turn = [&](double t) noexcept {
-            return Complex(std::cos(w * t), -std::sin(w * t));
-        };
-        Complex in = 0.0;
-        Complex out = 0.0;
-        Complex at = 1.0;
-        const Complex by = turn(h);
-        for (std::size_t i = 0; i < count_; ++i) {
-            out += kept_[i] * std::fmin(h, span - static_cast<double>(i) * h) * at;
-            at = {at.real() * by.real() - at.imag() * by.imag(),
-                  at.real() * by.imag() + at.imag() * by.real()};
-        }
-        for (std::size_t i = 0; i < periods;
-             ++i) {  // twice the amplitude while it is up, against the middle of the relay
-            in += turn(downs_[i] - begin) - turn(ups_[i] - begin);
-        }
-        in *= 2.0 * std::fabs(amplitude) * Complex(0.0, 1.0 / w);
-        if (!is_swing(2.0 * std::abs(out) / span)) return fail(Failure::noisy);
-        const double response = std::abs(out) / std::abs(in);
-        const double late = -std::arg(-out / in);
+        const double w = 2.0 * std::numbers::pi * periods / span;
+        const Complex response = response_harmonic(w, dt * static_cast<double>(decimation_), span);
+        const Complex excitation = excitation_harmonic(w);
+        if (!is_swing(2.0 * std::abs(response) / span)) return fail(Failure::noisy);
+        const double gain_at_w = std::abs(response) / std::abs(excitation);
+        const double lag_beyond_half_turn = -std::arg(-response / excitation);
 
-        const double quarter = 0.5 * std::numbers::pi;
-        const double farther = std::clamp(quarter / (quarter + late), 0.5, 2.0);
-        const double ku = farther / response;
-        const double tu = 2.0 * std::numbers::pi / (w * farther);
+        const double quarter_turn = 0.5 * std::numbers::pi;
+        const double ultimate_to_w =
+            std::clamp(quarter_turn / (quarter_turn + lag_beyond_half_turn), 0.5, 2.0);
+        const double ku = ultimate_to_w / gain_at_w;
+        const double tu = 2.0 * std::numbers::pi / (w * ultimate_to_w);
         if (!(std::isfinite(ku) && ku > 0.0)) return fail(Failure::no_oscillation);
         ultimate_gain = ku;
         ultimate_period = tu;
@@ -367,6 +380,33 @@ private:
         igain = pgain / (2.2 * tu);
         dgain = 0.0;
         enter(Phase::done);
+    }
+
+    using Complex = std::complex<double>;
+    /// e^(-j angle)
+    static Complex phasor(double angle) noexcept {
+        return Complex(std::cos(angle), -std::sin(angle));
+    }
+    /// The integral of the kept samples, h apart, times e^(-j w t) over `span`.
+    Complex response_harmonic(double w, double h, double span) const noexcept {
+        Complex sum = 0.0;
+        Complex turned = 1.0;
+        const Complex turn = phasor(w * h);
+        for (std::size_t i = 0; i < count_; ++i) {
+            sum += kept_[i] * std::fmin(h, span - static_cast<double>(i) * h) * turned;
+            turned = {turned.real() * turn.real() - turned.imag() * turn.imag(),
+                      turned.real() * turn.imag() + turned.imag() * turn.real()};
+        }
+        return sum;
+    }
+    /// The same integral of the output, from its switching times: twice the amplitude while it is
+    /// up, against the middle of the relay.
+    Complex excitation_harmonic(double w) const noexcept {
+        Complex sum = 0.0;
+        for (std::size_t i = 0; i < periods; ++i) {
+            sum += phasor(w * (downs_[i] - ups_[0])) - phasor(w * (ups_[i] - ups_[0]));
+        }
+        return sum * (2.0 * std::fabs(amplitude) * Complex(0.0, 1.0 / w));
     }
 
     /// Returns whether a harmonic of this amplitude is most of what is kept. Noise that switches the
@@ -383,39 +423,40 @@ private:
         return 0.5 * harmonic * harmonic > 0.75 * variance;
     }
 
+    static constexpr std::size_t min_step_samples = 20;
+    static constexpr int transient_periods = 3;
     static constexpr std::size_t periods = 4;
     static constexpr double min_period_cycles = 8.0;  // noise can switch the relay in each cycle
 
-    Phase now_ = Phase::idle;
-    double time_ = 0.0;
-    double first_ = 0.0;
-    double start_ = 0.0;
-    double noise_ = 0.0;
-    double quiet_sum_ = 0.0;
-
+    Phase state_ = Phase::idle;
+    double time_ = 0.0;  // in this state, s
+    double first_ = 0.0;  // value that the sums below are relative to
+    double start_ = 0.0;  // mean of the value at rest
+    double noise_ = 0.0;  // standard deviation of the value at rest
+    double quiet_sum_ = 0.0;  // second half of the settling time
     double quiet_square_ = 0.0;
     double quiet_count_ = 0.0;
-    double late_sum_ = 0.0;
+    double late_sum_ = 0.0;  // its last quarter
     double late_count_ = 0.0;
     double drift_ = 0.0;  // at the step, per second
     double drift_noise_ = 0.0;  // its standard deviation
     std::vector<double> kept_;  // the answer, from where it rested
     std::size_t count_ = 0;
-    std::size_t thin_ = 1;
-    std::size_t skip_ = 0;
+    std::size_t decimation_ = 1;
+    std::size_t samples_seen_ = 0;  // kept or not
     hal::RisingEdge step_edge_;
     hal::RisingEdge relay_edge_;
-    bool high_ = false;
-    double last_switch_ = -1.0;
+    bool high_ = false;  // the relay is at bias + amplitude
+    double last_switch_ = -1.0;  // to high; negative: none yet
     double top_ = 0.0;
     double bottom_ = 0.0;
-    int swings_ = 0;
-    std::size_t even_ = 0;  // periods so far that are compared
+    int swings_ = 0;  // whole periods
+    std::size_t compared_ = 0;  // periods since the transient, 0..periods
     double shortest_ = 0.0;
-    double max_ = 0.0;  // of them
+    double longest_ = 0.0;  // of the compared periods
     std::array<double, periods> ups_{}, downs_{};  // when the output was switched
     hal::Retained retained_{*this,
-                            {{"now", now_},
+                            {{"now", state_},
                              {"time", time_},
                              {"first", first_},
                              {"start", start_},
@@ -429,8 +470,8 @@ private:
                              {"drift-noise", drift_noise_},
                              {"kept", kept_},
                              {"count", count_},
-                             {"thin", thin_},
-                             {"skip", skip_},
+                             {"thin", decimation_},
+                             {"skip", samples_seen_},
                              {"step-was", step_edge_},
                              {"relay-was", relay_edge_},
                              {"high", high_},
@@ -438,9 +479,9 @@ private:
                              {"top", top_},
                              {"bottom", bottom_},
                              {"swings", swings_},
-                             {"even", even_},
+                             {"even", compared_},
                              {"shortest", shortest_},
-                             {"longest", max_},
+                             {"longest", longest_},
                              {"ups", ups_},
                              {"downs", downs_}}};
 };

@@ -25,15 +25,15 @@ struct Linear {
         multiply(to.x, a, from.x);
         multiply(pushed, b, to.u);
         to.x += pushed;
-        spread(to.p, a, from.p, q);
+        propagate_covariance(to.p, a, from.p, q);
     }
-    Fate measure(Moment& moment, Eigen::Index channel, double gate) const noexcept {
+    Correction measure(Moment& moment, Eigen::Index channel, double gate) const noexcept {
         const Vector row = c.row(channel).transpose();
-        double off = moment.z(channel);
+        double innovation = moment.z(channel);
         for (Eigen::Index i = 0; i < row.size(); ++i) {
-            off -= row(i) * moment.x(i);
+            innovation -= row(i) * moment.x(i);
         }
-        return correct(moment.x, moment.p, row, off, r(channel), gate);
+        return correct(moment.x, moment.p, row, innovation, r(channel), gate);
     }
 };
 
@@ -89,10 +89,10 @@ public:
         if (whole_ == nullptr) {
             channels_.feed(past_, cycle);
         } else {
-            channels_.tell_whole(past_, cycle, *whole_);
+            channels_.feed_decorrelated(past_, cycle, *whole_);
         }
         past_.settle(std::fmax(channels_.gate, 0.0));
-        channels_.count(past_, cycle);
+        channels_.show_outcome(past_, cycle);
         const Moment& now = past_.now();
         for (std::size_t i = 0; i < x.size(); ++i) {
             const auto at = static_cast<Eigen::Index>(i);

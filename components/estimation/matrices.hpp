@@ -56,49 +56,52 @@ public:
     }
 
 private:
-    static bool space(char c) { return c == ' ' || c == '\t' || c == ',' || c == '\r'; }
+    static bool is_separator(char c) { return c == ' ' || c == '\t' || c == ',' || c == '\r'; }
 
     void in_files() {
         for (Given& given : found) {
             given.in_file = true;
         }
     }
-    void read_line(std::size_t at, std::size_t end) {
-        if (const std::size_t equals = text_.substr(at, end - at).find('=');
-            equals != std::string_view::npos) {
-            std::size_t begin = at;
-            std::size_t stop = at + equals;
-            while (begin < stop && space(text_[begin])) {
-                ++begin;
-            }
-            while (stop > begin && space(text_[stop - 1])) {
-                --stop;
-            }
-            finish();
-            const std::string name(text_.substr(begin, stop - begin));
-            bool word = !name.empty() && std::isalpha(static_cast<unsigned char>(name[0]));
-            for (const char c : name) {
-                word =
-                    word && (std::isalnum(static_cast<unsigned char>(c)) || c == '_' || c == '-');
-            }
-            if (!word) {
-                report_at(begin, std::max(stop, begin + 1),
-                          "'" + name + "' is not a name of a matrix",
-                          "write NAME = numbers, as in: A = 0 1");
-            }
-            const std::string key = lower(name);
-            if (++defined_[key] == 2) {
-                report_at(begin, stop, "duplicate matrix '" + name + "'",
-                          "delete all but one of them");
-            }
-            open(name, begin, stop);
-            at += equals + 1;
+    /// A line `NAME = rows` begins a matrix, any other continues it.
+    void read_line(std::size_t begin, std::size_t end) {
+        const std::size_t equals = text_.substr(begin, end - begin).find('=');
+        if (equals == std::string_view::npos) {
+            rows(begin, end);
+            return;
         }
-        rows(at, end);
+        begin_matrix(begin, begin + equals);
+        rows(begin + equals + 1, end);
     }
+    /// Reads the name, which stands between blanks.
+    void begin_matrix(std::size_t begin, std::size_t end) {
+        while (begin < end && is_separator(text_[begin])) {
+            ++begin;
+        }
+        while (end > begin && is_separator(text_[end - 1])) {
+            --end;
+        }
+        finish();
+        const std::string name(text_.substr(begin, end - begin));
+        if (!is_matrix_name(name)) {
+            report_at(begin, std::max(end, begin + 1), "'" + name + "' is not a name of a matrix",
+                      "write NAME = numbers, as in: A = 0 1");
+        }
+        const std::string key = lower(name);
+        if (++defined_[key] == 2) {
+            report_at(begin, end, "duplicate matrix '" + name + "'", "delete all but one of them");
+        }
+        open(name, begin, end);
+    }
+    static bool is_matrix_name(std::string_view name) {
+        return !name.empty() && is_letter(name[0]) && std::ranges::all_of(name, [](char c) {
+            return is_alphanumeric(c) || c == '_' || c == '-';
+        });
+    }
+    /// Reads the numbers of a line; its end and each `;` end a row.
     void rows(std::size_t at, std::size_t end) {
         while (at < end) {
-            if (space(text_[at])) {
+            if (is_separator(text_[at])) {
                 ++at;
                 continue;
             }
@@ -108,7 +111,7 @@ private:
                 continue;
             }
             std::size_t stop = at;
-            while (stop < end && !space(text_[stop]) && text_[stop] != ';') {
+            while (stop < end && !is_separator(text_[stop]) && text_[stop] != ';') {
                 ++stop;
             }
             word(at, stop);
@@ -119,11 +122,11 @@ private:
     void word(std::size_t at, std::size_t stop) {
         const std::string token(text_.substr(at, stop - at));
         if (!open_) {
-            if (!lost_) {
+            if (!outside_reported_) {
                 report_at(at, stop, "'" + token + "' outside a matrix",
                           "write NAME = before the numbers, as in: A = 0 1");
             }
-            lost_ = true;
+            outside_reported_ = true;
             return;
         }
         if (token == "diag" && numbers_.empty() && rows_.empty() && !diagonal_) {
@@ -162,40 +165,55 @@ private:
                     static_cast<std::uint32_t>(end),
                     {}};
         open_ = true;
-        diagonal_ = lost_ = false;
+        diagonal_ = outside_reported_ = false;
     }
+    /// Ends the matrix that is open. Its value is set only as long as there are no problems.
     void finish() {
         if (!open_) return;
         row();
         open_ = false;
-        const std::size_t high = rows_.size();
-        const std::size_t wide = rows_.empty() ? 0 : rows_[0].size();
-        if (high == 0) {
+        if (rows_.empty()) {
             report_at(current_.begin, current_.end, "'" + current_.name + "' has no numbers",
                       "write them after the =, or in the lines below it");
         }
-        if (diagonal_ && high > 1) {
+        if (diagonal_ && rows_.size() > 1) {
             report_at(current_.begin, current_.end,
                       "'" + current_.name + "' has several rows after diag",
                       "write one row after diag: diag 1 2 3");
         }
-        const auto index = [](std::size_t i) { return static_cast<Eigen::Index>(i); };
         if (problems.empty()) {
-            current_.value = Eigen::MatrixXd::Zero(index(diagonal_ ? wide : high), index(wide));
-            for (std::size_t i = 0; i < high; ++i) {
-                for (std::size_t j = 0; j < wide; ++j) {
-                    current_.value(index(diagonal_ ? j : i), index(j)) = rows_[i][j];
-                }
-            }
-            if (current_.value.rows() > max || current_.value.cols() > max) {
-                report_at(current_.begin, current_.end,
-                          current_.name + " is " + std::to_string(current_.value.rows()) + " x " +
-                              std::to_string(current_.value.cols()),
-                          "matrices have at most " + std::to_string(max) + " rows and columns");
-            }
+            current_.value = diagonal_ ? diagonal_matrix(rows_[0]) : matrix_of(rows_);
+            report_size(current_);
         }
         rows_.clear();
         found.push_back(std::move(current_));
+    }
+    using Row = std::vector<double>;
+    static Eigen::MatrixXd diagonal_matrix(const Row& diagonal) {
+        const auto size = static_cast<Eigen::Index>(diagonal.size());
+        Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(size, size);
+        for (Eigen::Index i = 0; i < size; ++i) {
+            matrix(i, i) = diagonal[static_cast<std::size_t>(i)];
+        }
+        return matrix;
+    }
+    static Eigen::MatrixXd matrix_of(const std::vector<Row>& rows) {
+        Eigen::MatrixXd matrix(static_cast<Eigen::Index>(rows.size()),
+                               static_cast<Eigen::Index>(rows[0].size()));
+        for (std::size_t i = 0; i < rows.size(); ++i) {
+            for (std::size_t j = 0; j < rows[i].size(); ++j) {
+                matrix(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = rows[i][j];
+            }
+        }
+        return matrix;
+    }
+    void report_size(const Given& matrix) {
+        const Eigen::Index rows = matrix.value.rows();
+        const Eigen::Index columns = matrix.value.cols();
+        if (rows <= max && columns <= max) return;
+        report_at(matrix.begin, matrix.end,
+                  matrix.name + " is " + std::to_string(rows) + " x " + std::to_string(columns),
+                  "matrices have at most " + std::to_string(max) + " rows and columns");
     }
     void report_at(std::size_t begin, std::size_t end, std::string sentence, std::string help) {
         text::add(problems, begin, end, std::move(sentence), std::move(help));
@@ -206,9 +224,9 @@ private:
     std::map<std::string, unsigned> defined_;  // by name in lower case: how often
     bool open_ = false;
     bool diagonal_ = false;
-    bool lost_ = false;
-    std::vector<double> numbers_;
-    std::vector<std::vector<double>> rows_;
+    bool outside_reported_ = false;  // once, until the next matrix begins
+    Row numbers_;  // of the row that is read
+    std::vector<Row> rows_;
     std::size_t row_begin_ = 0;
     std::size_t row_end_ = 0;
 };
@@ -223,35 +241,30 @@ struct Wanted {
 /// The matrices of one instance. In a component's constructor only.
 class Matrices {
 public:
+    /// Declares the load arguments, reads the file, then the arguments, which replace matrices of
+    /// the file. The examples apply only if there is neither a file nor an argument. Throws for an
+    /// invalid matrix. [setup]
     Matrices(hal::Component& component, std::initializer_list<Wanted> wanted)
         : texts_(component),
           file_(component, "file", "",
                 "file with the matrices, beside the netlist; an argument takes precedence") {
         std::vector<std::pair<const Wanted*, std::string>> arguments;
-        bool any = !file_.get().empty();
-        for (const Wanted& w : wanted) {
-            arguments.emplace_back(&w, hal::Argument::ask(lower(w.name).c_str(), "", w.doc, {}));
-            any = any || !arguments.back().second.empty();
+        bool user_gives_one = !file_.get().empty();
+        for (const Wanted& matrix : wanted) {
+            std::string text = hal::Argument::ask(lower(matrix.name).c_str(), "", matrix.doc, {});
+            user_gives_one = user_gives_one || !text.empty();
+            arguments.emplace_back(&matrix, std::move(text));
         }
         if (!file_.get().empty()) {
             read_file();
         }
-        for (const auto& [w, text] : arguments) {
-            if (text.empty() && (any || *w->example == '\0')) continue;
-            MatrixText reader;
-            reader.read_rows(w->name, text.empty() ? w->example : text);
-            const bool whole = text.size() <= 40;
-            std::string argument = lower(w->name);
-            argument.append("=")
-                .append(text, 0, whole ? text.size() : 37)
-                .append(whole ? "" : "...");
-            if (!reader.problems.empty()) {
-                throw hal::ArgumentError(
-                    lower(w->name),
-                    argument + ": " + reader.problems[0].sentence + "; " + reader.problems[0].help);
+        for (const auto& [matrix, text] : arguments) {
+            const std::string example = user_gives_one ? "" : matrix->example;
+            if (!text.empty()) {
+                read_argument(matrix->name, text, shortened(text));
+            } else if (!example.empty()) {
+                read_argument(matrix->name, example, "");
             }
-            reader.found[0].argument = argument;
-            given_[lower(w->name)] = std::move(reader.found[0]);
         }
     }
     bool has(const char* name) const { return given_.contains(lower(name)); }
@@ -331,9 +344,32 @@ private:
         }
     }
 
+    /// Reads the rows of one matrix. `shown` stands for them in messages.
+    void read_argument(const char* name, const std::string& rows, const std::string& shown) {
+        MatrixText reader;
+        reader.read_rows(name, rows);
+        const std::string key = lower(name);
+        const std::string argument = key + "=" + shown;
+        if (!reader.problems.empty()) {
+            const text::Problem& problem = reader.problems.front();
+            throw hal::ArgumentError(key, argument + ": " + problem.sentence + "; " + problem.help);
+        }
+        Given& matrix = reader.found.front();
+        matrix.argument = argument;
+        given_[key] = std::move(matrix);
+    }
+    static std::string shortened(std::string text) {
+        constexpr std::size_t max_shown = 40;
+        if (text.size() > max_shown) {
+            text.resize(max_shown - 3);
+            text += "...";
+        }
+        return text;
+    }
+
     hal::Texts texts_;
     hal::TextArgument file_;
-    std::map<std::string, Given> given_;
+    std::map<std::string, Given> given_;  // by name in lower case
 };
 
 }  // namespace hal::estimation

@@ -3,6 +3,7 @@
 // steps are repeated.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <memory>
@@ -26,27 +27,32 @@ struct Moment {
     std::uint32_t fresh = 0;  ///< those of `measured` that were not counted yet
 };
 
-/// The outcome of a measurement.
-enum class Fate { none, used, outlier, lost };
+/// What became of a measurement: beyond the gate it is an outlier; it is invalid where the
+/// covariance is no longer positive.
+enum class Correction { none, used, outlier, invalid };
 
-/// x and P after a scalar measurement of cx with variance r, by Joseph's form (P. Joseph, in R.
-/// Bucy, *Filtering for Stochastic Processes*, 1968):
-///     k = Pc / (c'Pc + r),  x <- x + k off,  P <- (I - kc')P(I - kc')' + k r k'
-/// which remains symmetric and positive where P - kc'P does not; the two halves are symmetrised. A
-/// deviation beyond `gate` standard deviations changes nothing; 0 disables the gate. [realtime]
-inline Fate correct(Vector& x, Matrix& p, const Vector& c, double off, double r,
-                    double gate) noexcept {
+/// Corrects x and P by a scalar measurement z of c'x with the variance r, by Joseph's form (P.
+/// Joseph, in R. Bucy, *Filtering for Stochastic Processes*, 1968), with M = (I - kc')P:
+///     innovation = z - c'x,  k = Pc / (c'Pc + r),  x <- x + k innovation,  P <- M + (rk - Mc)k'
+/// which remains symmetric and positive where P - kc'P does not; the two halves are symmetrised. An
+/// innovation beyond `gate` standard deviations changes nothing; 0 disables the gate. [realtime]
+inline Correction correct(Vector& x, Matrix& p, const Vector& c, double innovation, double r,
+                          double gate) noexcept {
     const Eigen::Index n = x.size();
     Vector pc, k, mc;
     multiply(pc, p, c);
-    double s = r;
+    double innovation_variance = r;
     for (Eigen::Index i = 0; i < n; ++i) {
-        s += c(i) * pc(i);
+        innovation_variance += c(i) * pc(i);
     }
-    if (!(s > 0.0) || !std::isfinite(s)) return Fate::lost;
-    if (gate > 0.0 && off * off > gate * gate * s) return Fate::outlier;
-    k = pc / s;
-    x += k * off;
+    if (!(innovation_variance > 0.0) || !std::isfinite(innovation_variance)) {
+        return Correction::invalid;
+    }
+    if (gate > 0.0 && innovation * innovation > gate * gate * innovation_variance) {
+        return Correction::outlier;
+    }
+    k = pc / innovation_variance;
+    x += k * innovation;
     double* const all = p.data();
     for (Eigen::Index j = 0; j < n; ++j) {
         for (Eigen::Index i = 0; i < n; ++i) {
@@ -65,11 +71,12 @@ inline Fate correct(Vector& x, Matrix& p, const Vector& c, double off, double r,
             p(i, j) = p(j, i) = 0.5 * (p(i, j) + p(j, i));
         }
     }
-    return Fate::used;
+    return Correction::used;
 }
 
 /// to = A P A' + Q for a symmetric P, symmetric to the last bit. [realtime]
-inline void spread(Matrix& to, const Matrix& a, const Matrix& p, const Matrix& q) noexcept {
+inline void propagate_covariance(Matrix& to, const Matrix& a, const Matrix& p,
+                                 const Matrix& q) noexcept {
     const Eigen::Index n = a.rows();
     Matrix ap;
     multiply(ap, a, p);
@@ -95,7 +102,7 @@ inline void spread(Matrix& to, const Matrix& a, const Matrix& p, const Matrix& q
 
 /// The filter over its last `history` moments. `Model` has, all [realtime]:
 ///     void predict(Moment& to, const Moment& from)             x and P a period later, under to.u
-///     Fate measure(Moment& at, Eigen::Index channel, double gate)  takes one of at.z
+///     Correction measure(Moment& at, Eigen::Index channel, double gate)  corrects by one of at.z
 template <class Model>
 class Past {
 public:
@@ -119,43 +126,29 @@ public:
     }
     /// Adds measurement `channel`, `cycles` old. False if it is older than the history. [realtime]
     bool add(Eigen::Index channel, double z, std::int64_t cycles) noexcept {
-        if (cycles < 0) {
-            cycles = 0;
-        }
+        cycles = std::max<std::int64_t>(cycles, 0);
         // the oldest step cannot be repeated: its predecessor is no longer stored
-        if (cycles >= static_cast<std::int64_t>(known_) - (full() ? 1 : 0)) return false;
-        const std::uint64_t where = number_ - static_cast<std::uint64_t>(cycles);
-        Moment& moment = at(where);
+        const std::size_t repeatable = full() ? known_ - 1 : known_;
+        if (cycles >= static_cast<std::int64_t>(repeatable)) return false;
+        const std::uint64_t step = number_ - static_cast<std::uint64_t>(cycles);
+        Moment& moment = at(step);
         moment.z(channel) = z;
         moment.measured |= std::uint32_t{1} << channel;
         moment.fresh |= std::uint32_t{1} << channel;
-        if (where < first_) {
-            first_ = where;
-        }
+        first_ = std::min(first_, step);
         return true;
     }
     /// Repeats all steps from the oldest new measurement on. [realtime]
     void settle(double gate) noexcept {
-        for (std::uint64_t k = first_; k <= number_; ++k) {
-            Moment& moment = at(k);
-            if (k == 1) {
+        for (std::uint64_t step = first_; step <= number_; ++step) {
+            Moment& moment = at(step);
+            if (step == 1) {
                 moment.x = start_.x;
                 moment.p = start_.p;
             } else {
-                model_.predict(moment, at(k - 1));
+                model_.predict(moment, at(step - 1));
             }
-            for (Eigen::Index i = 0; i < moment.z.size(); ++i) {
-                if ((moment.measured >> i & 1) == 0) continue;
-                const Fate fate = model_.measure(moment, i, gate);
-                if (moment.fresh >> i & 1) {
-                    used += fate == Fate::used;
-                    outliers += fate == Fate::outlier;
-                }
-                if (fate == Fate::lost) {
-                    renew(moment);
-                }
-            }
-            moment.fresh = 0;
+            correct_by_measurements(moment, gate);
             if (!finite(moment.x) || !finite(moment.p)) {
                 renew(moment);
             }
@@ -185,9 +178,26 @@ public:
     std::uint32_t renewals = 0;
 
 private:
+    void correct_by_measurements(Moment& moment, double gate) noexcept {
+        for (Eigen::Index channel = 0; channel < moment.z.size(); ++channel) {
+            const std::uint32_t bit = std::uint32_t{1} << channel;
+            if ((moment.measured & bit) == 0) continue;
+            const Correction outcome = model_.measure(moment, channel, gate);
+            if ((moment.fresh & bit) != 0) {
+                used += outcome == Correction::used;
+                outliers += outcome == Correction::outlier;
+            }
+            if (outcome == Correction::invalid) {
+                renew(moment);
+            }
+        }
+        moment.fresh = 0;
+    }
+
     Moment& at(std::uint64_t k) noexcept { return moments_[k % moments_.size()]; }
     const Moment& at(std::uint64_t k) const noexcept { return moments_[k % moments_.size()]; }
     bool full() const noexcept { return number_ > moments_.size(); }
+    /// Starts again with the initial covariance, and the initial state if there is no other.
     void renew(Moment& moment) noexcept {
         if (!finite(moment.x)) {
             moment.x = start_.x;
@@ -199,9 +209,9 @@ private:
     Model& model_;
     const Moment start_;
     std::vector<Moment> moments_;
-    std::uint64_t number_ = 0;
-    std::uint64_t first_ = 0;
-    std::size_t known_ = 0;
+    std::uint64_t number_ = 0;  // of the current step, from 1
+    std::uint64_t first_ = 0;  // step with the oldest new measurement
+    std::size_t known_ = 0;  // steps in the history
 };
 
 }  // namespace hal::estimation

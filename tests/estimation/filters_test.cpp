@@ -219,10 +219,10 @@ TEST(Joseph, Keeps_a_covariance_symmetric_and_positive_where_the_short_form_does
     for (int k = 0; k < 3000; ++k) {
         c << 1.0, 1e-3 * (k % 7), 1.0 - 1e-9 * (k % 5);
         Matrix next;
-        spread(next, a, p, q);
+        propagate_covariance(next, a, p, q);
         p = next;
         ASSERT_EQ(static_cast<int>(correct(x, p, c, 0.1, 1e-14, 0.0)),
-                  static_cast<int>(Fate::used));
+                  static_cast<int>(Correction::used));
         for (Eigen::Index i = 0; i < n; ++i) {
             ASSERT_GE(p(i, i), 0.0) << k;
             for (Eigen::Index j = 0; j < n; ++j) {
