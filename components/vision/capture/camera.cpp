@@ -14,32 +14,33 @@
 namespace hal::vision {
 namespace {
 
+/// Offsets in the text; an end of 0: not in the text.
 struct Word {
     std::size_t begin = 0;
     std::size_t end = 0;
 };
 
 /// Shared by both formats: spans, problems and the result.
-class Text {
+class CameraReader {
 public:
-    explicit Text(std::string_view text) : text_(text) {}
+    explicit CameraReader(std::string_view text) : text_(text) {}
     CameraText finish() {
-        if (found_.problems.empty()) {
-            check();
+        if (result_.problems.empty()) {
+            report_implausible();
         }
-        return std::move(found_);
+        return std::move(result_);
     }
 
 protected:
     void report(std::size_t begin, std::size_t end, std::string sentence, std::string help) {
-        text::add(found_.problems, begin, end, std::move(sentence), std::move(help));
+        text::add(result_.problems, begin, end, std::move(sentence), std::move(help));
     }
-    std::string of(Word w) const {
+    std::string text_at(Word w) const {
         return std::string(text_.substr(w.begin, std::min<std::size_t>(w.end - w.begin, 60)));
     }
 
-    bool number(Word w, double& to) {
-        const std::string token = of(w);
+    bool parse_number(Word w, double& to) {
+        const std::string token = text_at(w);
         const auto real = parse_real(token);
         to = real.value_or(0.0);
         if (real && std::fabs(to) < 1e12) return true;
@@ -47,24 +48,25 @@ protected:
                "write numbers as in 600.5 or -2e-3");
         return false;
     }
-    bool whole(Word w, int& to) {
+    /// A width or a height.
+    bool parse_pixels(Word w, int& to) {
         double value = 0;
-        if (!number(w, value)) return false;
+        if (!parse_number(w, value)) return false;
         if (value != std::floor(value) || value < 1 || value > 8192) {
-            report(w.begin, w.end, "'" + of(w) + "' is not a valid image width or height",
+            report(w.begin, w.end, "'" + text_at(w) + "' is not a valid image width or height",
                    "write an integer of 1..8192");
             return false;
         }
         to = static_cast<int>(value);
         return true;
     }
-    void missing(const char* name, const std::string& example) {
+    void report_missing(const char* name, const std::string& example) {
         report(0, std::min<std::size_t>(text_.size(), 1), std::string("missing ") + name,
                "write a line: " + example);
     }
     /// Rejects implausible cameras: a file of another kind, or numbers in the wrong order.
-    void check() {
-        const Camera& c = found_.camera;
+    void report_implausible() {
+        const Camera& c = result_.camera;
         const auto wrong = [&](Word at, const std::string& sentence, const std::string& help) {
             report(at.begin, std::max(at.end, at.begin + 1), sentence, help);
         };
@@ -97,133 +99,174 @@ protected:
     /// corner, at most four times as fast, and the tangential part must not turn it back.
     static double usable_px(const Camera& c) {
         const auto [k1, k2, p1, p2, k3] = c.distortion;
-        double corner = 0;
-        for (const double x : {-c.cx / c.fx, (c.width - 1 - c.cx) / c.fx}) {
-            for (const double y : {-c.cy / c.fy, (c.height - 1 - c.cy) / c.fy}) {
-                corner = std::max(corner, std::hypot(x, y));
-            }
-        }
+        const double corner = corner_radius(c);
         const double step = corner / 200;
         const double tangential = 6 * std::hypot(p1, p2);
-        double seen = 0;
+        double distorted = 0;  // the radius at which a ray of the radius r is seen
         // a lens that needs ten times the radius of the corner shows nothing there
-        for (int i = 1; i <= 2000 && seen < corner; ++i) {
-            const double q = step * i * step * i;
-            const double slope =
-                1 + q * (3 * k1 + q * (5 * k2 + q * 7 * k3)) - tangential * step * i;
-            if (!(slope > 0 && slope < 4)) return seen * c.fx;
-            seen = step * i * (1 + q * (k1 + q * (k2 + q * k3)));
+        for (int i = 1; i <= 2000 && distorted < corner; ++i) {
+            const double r = step * i;
+            const double q = r * r;
+            const double slope = 1 + q * (3 * k1 + q * (5 * k2 + q * 7 * k3)) - tangential * r;
+            if (!(slope > 0 && slope < 4)) return distorted * c.fx;
+            distorted = r * (1 + q * (k1 + q * (k2 + q * k3)));
         }
-        return seen < corner ? seen * c.fx : -1.0;
+        return distorted < corner ? distorted * c.fx : -1.0;
+    }
+    /// The distance of the farthest corner from the centre, divided by the focal length.
+    static double corner_radius(const Camera& c) {
+        double radius = 0;
+        for (const double x : {-c.cx / c.fx, (c.width - 1 - c.cx) / c.fx}) {
+            for (const double y : {-c.cy / c.fy, (c.height - 1 - c.cy) / c.fy}) {
+                radius = std::max(radius, std::hypot(x, y));
+            }
+        }
+        return radius;
     }
 
+    Camera& camera() { return result_.camera; }
+
     std::string_view text_;
-    CameraText found_;
-    Word focal_, centre_, distortion_;
+    CameraText result_;
+    Word focal_, centre_, distortion_;  ///< where they are given
 };
 
-class OwnText : public Text {
+/// Lines KEY NUMBER….
+class CameraLines : public CameraReader {
 public:
-    using Text::Text;
+    using CameraReader::CameraReader;
     CameraText read() {
         text::Lines lines(text_);
         while (const auto line = lines.next()) {
-            one(*line);
+            read_line(*line);
         }
-        Camera& c = found_.camera;
-        if (found_.problems.empty()) {
-            if (c.width == 0) {
-                missing("size", "size 640 480");
-            }
-            if (c.fx == 0 && focal_.end == 0) {
-                missing("focal", "focal 600 600");
-            }
-            if (centre_.end == 0) {
-                c.cx = (c.width - 1) / 2.0;
-                c.cy = (c.height - 1) / 2.0;
-            }
+        if (result_.problems.empty()) {
+            complete();
         }
         return finish();
     }
 
 private:
-    /// Reads a line KEY VALUES…, and reports an unknown or repeated key and invalid values.
-    void one(const text::Word& line) {
-        std::vector<Word> words;
+    /// The name of a key, then its numbers.
+    using Words = std::vector<Word>;
+
+    struct Key {
+        std::string_view name;
+        std::size_t min_numbers;
+        std::size_t max_numbers;
+        const char* example;
+        Word CameraLines::* given;  ///< the line with this key; without an end: none yet
+        void (CameraLines::*read)(const Words&);
+    };
+
+    static const Key* find_key(std::string_view name) {
+        static constexpr Key keys[] = {
+            {"size", 2, 2, "size 640 480", &CameraLines::size_, &CameraLines::read_size},
+            {"focal", 1, 2, "focal 600 600", &CameraLines::focal_, &CameraLines::read_focal},
+            {"centre", 2, 2, "centre 319.5 239.5", &CameraLines::centre_,
+             &CameraLines::read_centre},
+            {"center", 2, 2, "centre 319.5 239.5", &CameraLines::centre_,
+             &CameraLines::read_centre},
+            {"distortion", 1, 5, "distortion 0.1 -0.2 0 0 0", &CameraLines::distortion_,
+             &CameraLines::read_distortion},
+        };
+        const auto* const key =
+            std::ranges::find_if(keys, [&](const Key& row) { return row.name == name; });
+        return key == std::end(keys) ? nullptr : key;
+    }
+
+    /// Reads one line. Reports an unknown or repeated key, a wrong number of numbers and invalid
+    /// numbers.
+    void read_line(const text::Word& line) {
+        Words words;
         for (const text::Word& word : text::words_of(line, ",=")) {
             words.push_back({word.at.offset, word.at.offset + word.at.length});
         }
         if (words.empty()) return;
-        Camera& c = found_.camera;
-        const std::string name = of(words[0]);
-        const Word all{words[0].begin, words.back().end};
-        if (name == "size") {
-            if (counted(words, name, 2, 2, "size 640 480") && once(c.width != 0, words[0])) {
-                whole(words[1], c.width);
-                whole(words[2], c.height);
-            }
-        } else if (name == "focal") {
-            if (!counted(words, name, 1, 2, "focal 600 600") || !once(focal_.end != 0, words[0])) {
-                return;
-            }
-            focal_ = all;
-            if (number(words[1], c.fx)) {
-                c.fy = c.fx;
-            }
-            if (words.size() == 3) {
-                number(words[2], c.fy);
-            }
-        } else if (name == "centre" || name == "center") {
-            if (!counted(words, name, 2, 2, "centre 319.5 239.5") ||
-                !once(centre_.end != 0, words[0])) {
-                return;
-            }
-            centre_ = all;
-            number(words[1], c.cx);
-            number(words[2], c.cy);
-        } else if (name == "distortion") {
-            if (!counted(words, name, 1, 5, "distortion 0.1 -0.2 0 0 0") ||
-                !once(distortion_.end != 0, words[0])) {
-                return;
-            }
-            distortion_ = all;
-            for (std::size_t i = 1; i < words.size(); ++i) {
-                number(words[i], c.distortion[i - 1]);
-            }
-        } else {
-            report(words[0].begin, words[0].end, "unknown key '" + name + "'",
+        const Word name = words.front();
+        const Key* const key = find_key(text_at(name));
+        if (key == nullptr) {
+            report(name.begin, name.end, "unknown key '" + text_at(name) + "'",
                    "the keys are size, focal, centre, distortion");
+            return;
         }
-    }
-    bool counted(const std::vector<Word>& words, const std::string& name, std::size_t min,
-                 std::size_t max, const char* example) {
         const std::size_t count = words.size() - 1;
-        if (count >= min && count <= max) return true;
-        const std::string wants =
-            min == max ? std::to_string(max) : std::to_string(min) + " to " + std::to_string(max);
-        report(words[0].begin, words.back().end,
-               name + " has " + hal::counted(count, "number") + ", expected " + wants,
-               std::string("write ") + example);
-        return false;
-    }
-    bool once(bool twice, Word name) {
-        if (twice) {
-            report(name.begin, name.end, "duplicate key '" + of(name) + "'", "delete one of them");
+        if (count < key->min_numbers || count > key->max_numbers) {
+            report_count(*key, words);
+            return;
         }
-        return !twice;
+        if ((this->*key->given).end != 0) {
+            report(name.begin, name.end, "duplicate key '" + text_at(name) + "'",
+                   "delete one of them");
+            return;
+        }
+        this->*key->given = {name.begin, words.back().end};
+        (this->*key->read)(words);
     }
+    void report_count(const Key& key, const Words& words) {
+        std::string expected = std::to_string(key.max_numbers);
+        if (key.min_numbers != key.max_numbers) {
+            expected = std::to_string(key.min_numbers) + " to " + expected;
+        }
+        report(words.front().begin, words.back().end,
+               text_at(words.front()) + " has " + counted(words.size() - 1, "number") +
+                   ", expected " + expected,
+               std::string("write ") + key.example);
+    }
+
+    void read_size(const Words& words) {
+        if (!parse_pixels(words[1], camera().width)) {
+            size_ = {};  // another line may give the size
+        }
+        parse_pixels(words[2], camera().height);
+    }
+    void read_focal(const Words& words) {
+        Camera& c = camera();
+        if (parse_number(words[1], c.fx)) {
+            c.fy = c.fx;
+        }
+        if (words.size() == 3) {
+            parse_number(words[2], c.fy);
+        }
+    }
+    void read_centre(const Words& words) {
+        parse_number(words[1], camera().cx);
+        parse_number(words[2], camera().cy);
+    }
+    void read_distortion(const Words& words) {
+        for (std::size_t i = 1; i < words.size(); ++i) {
+            parse_number(words[i], camera().distortion[i - 1]);
+        }
+    }
+
+    /// Reports missing keys. Without `centre` the optical axis meets the middle of the image.
+    void complete() {
+        Camera& c = camera();
+        if (size_.end == 0) {
+            report_missing("size", "size 640 480");
+        }
+        if (focal_.end == 0) {
+            report_missing("focal", "focal 600 600");
+        }
+        if (centre_.end == 0) {
+            c.cx = (c.width - 1) / 2.0;
+            c.cy = (c.height - 1) / 2.0;
+        }
+    }
+
+    Word size_;
 };
 
 #ifdef HALCYON_YAML
 /// The YAML that the calibration tools of OpenCV and ROS write.
-class YamlText : public Text {
+class CameraYaml : public CameraReader {
 public:
-    using Text::Text;
+    using CameraReader::CameraReader;
     CameraText read() {
         try {
             read(YAML::Load(std::string(text_)));
         } catch (const YAML::Exception& problem) {
-            found_.problems.clear();
+            result_.problems.clear();
             const std::size_t at =
                 problem.mark.is_null()
                     ? 0
@@ -238,45 +281,65 @@ public:
 private:
     void read(const YAML::Node& file) {
         if (!file.IsMap()) {
-            return missing("camera_matrix", "camera_matrix, as OpenCV's calibration writes it");
+            report_missing_matrix();
+            return;
         }
-        Camera& c = found_.camera;
-        size(file["image_width"], c.width);
-        size(file["image_height"], c.height);
-        if (found_.problems.empty() && (c.width == 0 || c.height == 0)) {
-            missing("image_width and image_height", "image_width: 640");
+        size(file["image_width"], camera().width);
+        size(file["image_height"], camera().height);
+        if (result_.problems.empty() && (camera().width == 0 || camera().height == 0)) {
+            report_missing("image_width and image_height", "image_width: 640");
         }
-        std::vector<double> k, d;
-        if (matrix(file, "camera_matrix", k, focal_)) {
-            if (k.size() == 9 && (k[3] != 0 || k[6] != 0 || k[7] != 0 || k[8] != 1)) {
-                report(focal_.begin, focal_.end, "invalid camera_matrix",
-                       "its rows are fx 0 cx, 0 fy cy, 0 0 1");
-            } else if (k.size() == 9) {
-                c.fx = k[0];
-                c.cx = k[2];
-                c.fy = k[4];
-                c.cy = k[5];
-            } else {
-                report(focal_.begin, focal_.end,
-                       "camera_matrix has " + std::to_string(k.size()) + " numbers, not 9",
-                       "it has 3 rows and 3 columns");
-            }
-            centre_ = focal_;
-        } else if (found_.problems.empty()) {
-            missing("camera_matrix", "camera_matrix, as OpenCV's calibration writes it");
-        }
-        bool plain = matrix(file, "distortion_coefficients", d, distortion_);
-        if (plain && d.size() > 5 &&
-            std::any_of(d.begin() + 5, d.end(), [](double v) { return v != 0; })) {
-            report(distortion_.begin, distortion_.end,
-                   "the distortion has " + std::to_string(d.size()) + " coefficients",
-                   "calibrate with k1 k2 p1 p2 k3 only");
-            plain = false;
-        }
-        for (std::size_t i = 0; plain && i < std::min<std::size_t>(d.size(), 5); ++i) {
-            c.distortion[i] = d[i];
-        }
+        read_camera_matrix(file);
+        read_distortion(file);
     }
+    void report_missing_matrix() {
+        report_missing("camera_matrix", "camera_matrix, as OpenCV's calibration writes it");
+    }
+
+    /// Its rows, one after the other, are fx 0 cx, 0 fy cy, 0 0 1.
+    void read_camera_matrix(const YAML::Node& file) {
+        std::vector<double> k;
+        if (!matrix(file, "camera_matrix", k, focal_)) {
+            if (result_.problems.empty()) {
+                report_missing_matrix();
+            }
+            return;
+        }
+        centre_ = focal_;
+        if (k.size() != 9) {
+            report(focal_.begin, focal_.end,
+                   "camera_matrix has " + std::to_string(k.size()) + " numbers, not 9",
+                   "it has 3 rows and 3 columns");
+            return;
+        }
+        if (k[3] != 0 || k[6] != 0 || k[7] != 0 || k[8] != 1) {
+            report(focal_.begin, focal_.end, "invalid camera_matrix",
+                   "its rows are fx 0 cx, 0 fy cy, 0 0 1");
+            return;
+        }
+        Camera& c = camera();
+        c.fx = k[0];
+        c.cx = k[2];
+        c.fy = k[4];
+        c.cy = k[5];
+    }
+
+    /// k1 k2 p1 p2 k3, of which the last may be missing; coefficients of larger models must be 0.
+    void read_distortion(const YAML::Node& file) {
+        std::vector<double> given;
+        if (!matrix(file, "distortion_coefficients", given, distortion_)) return;
+        auto& coefficients = camera().distortion;
+        const std::size_t count = std::min(given.size(), coefficients.size());
+        if (std::any_of(given.begin() + static_cast<std::ptrdiff_t>(count), given.end(),
+                        [](double value) { return value != 0; })) {
+            report(distortion_.begin, distortion_.end,
+                   "the distortion has " + std::to_string(given.size()) + " coefficients",
+                   "calibrate with k1 k2 p1 p2 k3 only");
+            return;
+        }
+        std::copy_n(given.begin(), count, coefficients.begin());
+    }
+
     /// Where a scalar is in the text; with quotes, where it begins.
     Word place(const YAML::Node& node) const {
         const YAML::Mark mark = node.Mark();
@@ -290,9 +353,10 @@ private:
     }
     void size(const YAML::Node& node, int& to) {
         if (node) {
-            whole(place(node), to);
+            parse_pixels(place(node), to);
         }
     }
+    /// Returns whether the file has the matrix, and its numbers are valid; `at` is its name.
     bool matrix(const YAML::Node& file, const std::string& name, std::vector<double>& to,
                 Word& at) {
         const YAML::Node node = file[name];
@@ -307,7 +371,7 @@ private:
         }
         for (const YAML::Node& element : data) {
             double value = 0;
-            if (!number(place(element), value)) return false;
+            if (!parse_number(place(element), value)) return false;
             to.push_back(value);
         }
         return true;
@@ -315,14 +379,14 @@ private:
 };
 #else
 /// This build reads no YAML.
-class YamlText : public Text {
+class CameraYaml : public CameraReader {
 public:
-    using Text::Text;
+    using CameraReader::CameraReader;
     CameraText read() {
         report(0, 1, "a calibration in YAML: this build of Halcyon does not read it",
                "sudo apt-get install libyaml-cpp-dev, then build again; or write size, focal, "
                "centre and distortion");
-        return std::move(found_);
+        return std::move(result_);
     }
 };
 #endif
@@ -334,7 +398,7 @@ CameraText read_camera(std::string_view text) {
     const bool yaml =
         first != std::string_view::npos &&
         (text.substr(first, 5) == "%YAML" || text.find("camera_matrix:") != std::string_view::npos);
-    return yaml ? YamlText(text).read() : OwnText(text).read();
+    return yaml ? CameraYaml(text).read() : CameraLines(text).read();
 }
 
 }  // namespace hal::vision
