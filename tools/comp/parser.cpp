@@ -42,7 +42,13 @@ private:
     };
     static const std::array<Keyword, 15> keywords;
 
+    static const Keyword* find_keyword(std::string_view word);
+    /// Parses a declaration with its `;`. Returns whether another one can be parsed here, after an
+    /// error too; otherwise the rest up to the next `;` is to be skipped.
     bool declaration();
+    void report_unknown_keyword(const Text& word);
+    /// Reports a missing `;`. Returns whether another declaration, or the code, can be parsed here.
+    bool semicolon();
     bool component(const Text& keyword);
     /// `pin` or `param`: DIRECTION TYPE NAME[SIZE] = START if CONDITION "DOC".
     bool item(const Text& keyword);
@@ -101,41 +107,53 @@ Tree Parser::parse() {
     return std::move(tree_);
 }
 
+const Parser::Keyword* Parser::find_keyword(std::string_view word) {
+    const auto row = std::find_if(keywords.begin(), keywords.end(),
+                                  [&](const Keyword& keyword) { return keyword.name == word; });
+    return row == keywords.end() ? nullptr : &*row;
+}
+
 bool Parser::declaration() {
     if (in_.take(';')) {
         return true;  // an empty one
     }
-    const Text keyword = in_.word();
-    if (!keyword.given()) {
+    const Text word = in_.word();
+    if (!word.given()) {
         return fail("a declaration starts with a word: pin, param, function, …",
                     "put C code after a line that consists of ;;");
     }
-    const Keyword* found = nullptr;
-    std::vector<std::string> all;
-    for (const Keyword& row : keywords) {
-        if (keyword == row.name) {
-            found = &row;
-        }
-        all.push_back(row.name);
-    }
-    if (!found) {
-        std::string help = did_you_mean(keyword.text, all);
-        if (help.empty()) {
-            help = "declarations: " + listed(all, all.size()) +
-                   "; C code follows a line that consists of ;;";
-        }
-        in_.error(keyword.span, "unknown declaration '" + keyword.text + "'", "", help);
-
+    const Keyword* const keyword = find_keyword(word.text);
+    if (!keyword) {
+        report_unknown_keyword(word);
         return false;
     }
-    const bool good = (this->*found->handler)(keyword);
-    if (in_.pop_broken() || !good) return false;
-    if (!in_.at_code() && in_.take(';')) return true;
-    const Span here = in_.at_code() ? in_.behind() : in_.here();
-    in_.error(here, "unexpected text in the declaration",
-              here.end - here.begin <= 1 ? "missing ';'" : "missing ';' before this");
-    // the next one can be read
-    return in_.at_code() || std::find(all.begin(), all.end(), in_.peek_word()) != all.end();
+    const bool parsed = (this->*keyword->handler)(word);
+    const bool unterminated_string = in_.pop_broken();
+    if (!parsed || unterminated_string) return false;
+    return semicolon();
+}
+
+void Parser::report_unknown_keyword(const Text& word) {
+    std::vector<std::string> names;
+    for (const Keyword& keyword : keywords) {
+        names.push_back(keyword.name);
+    }
+    std::string help = did_you_mean(word.text, names);
+    if (help.empty()) {
+        help = "declarations: " + listed(names, names.size()) +
+               "; C code follows a line that consists of ;;";
+    }
+    in_.error(word.span, "unknown declaration '" + word.text + "'", "", help);
+}
+
+bool Parser::semicolon() {
+    const bool code_follows = in_.at_code();
+    if (!code_follows && in_.take(';')) return true;
+    const Span marked = code_follows ? in_.behind() : in_.here();
+    const bool marks_a_word = marked.end - marked.begin > 1;
+    in_.error(marked, "unexpected text in the declaration",
+              marks_a_word ? "missing ';' before this" : "missing ';'");
+    return code_follows || find_keyword(in_.peek_word()) != nullptr;
 }
 
 bool Parser::component(const Text& keyword) {
