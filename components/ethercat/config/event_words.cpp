@@ -331,7 +331,7 @@ static_assert(bus::in_order(event_rows));
 
 /// What the values of a row are taken from.
 struct Source {
-    const Happened& what;
+    const EventRecord& what;
     const master::Setup& setup;
     const std::string& link;
     const std::string& backup;
@@ -553,7 +553,7 @@ std::string value_of(std::string_view name, const Source& source) {
 
 }  // namespace
 
-MessageSubject subject(const Happened& what) {
+MessageSubject subject(const EventRecord& what) {
     const bool by_position = what.slave >= Events::of_position && what.slave != Events::bus;
     MessageSubject of{std::to_string(static_cast<int>(what.event))};
     (by_position ? of.detail : of.kind) += " " + std::to_string(what.slave);
@@ -602,8 +602,8 @@ std::string slave_words(std::uint32_t slave, const master::Setup& setup) {
     return "slave " + where + (s.name.empty() ? "" : " (" + s.name + ")");
 }
 
-std::string event_words(const Happened& what, const master::Setup& setup, const std::string& link,
-                        const std::string& backup, Format format) {
+std::string event_words(const EventRecord& what, const master::Setup& setup,
+                        const std::string& link, const std::string& backup, Format format) {
     const Source source{what, setup, link, backup, format == Format::lcec};
     return bus::format(event_rows[static_cast<std::size_t>(what.event)].text, bus::Text::line,
                        [&](std::string_view name) { return value_of(name, source); });
@@ -615,7 +615,7 @@ bus::FaultTexts fault_texts(const master::Setup& setup, const std::string& link)
         const bool known = slave < setup.slaves.size();
         if (name == "who" && !known) return "a slave on " + link;
         if (name == "identity") return "is not the device of the configuration; it stays in INIT";
-        const Happened what{event, known ? static_cast<std::uint32_t>(slave) : Events::bus};
+        const EventRecord what{event, known ? static_cast<std::uint32_t>(slave) : Events::bus};
         return value_of(name, {what, setup, link, link, false});
     }};
 }

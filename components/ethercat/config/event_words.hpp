@@ -14,7 +14,7 @@
 namespace hal::ethercat::config {
 
 /// An event as master::Events received it.
-struct Happened {
+struct EventRecord {
     master::Event event{};
     std::uint32_t slave = master::Events::bus;
     std::int64_t first = 0;
@@ -26,8 +26,9 @@ enum class Format : std::uint8_t { ethercat, lcec };
 
 /// Returns the sentence for an event, without a final stop; empty for one that needs none. `link`
 /// and `backup` are the addresses of the ports. [setup]
-std::string event_words(const Happened& what, const master::Setup& setup, const std::string& link,
-                        const std::string& backup = {}, Format = Format::ethercat);
+std::string event_words(const EventRecord& what, const master::Setup& setup,
+                        const std::string& link, const std::string& backup = {},
+                        Format = Format::ethercat);
 
 /// Returns the texts of the faults of a bus, of the same table as the sentences; the subjects are
 /// the slaves of the setup. [setup]
@@ -35,7 +36,7 @@ bus::FaultTexts fault_texts(const master::Setup& setup, const std::string& link)
 
 /// Returns the subject of an event for rate limiting: an event of one slave is a kind, the code
 /// that a device chooses is the detail. [setup]
-MessageSubject subject(const Happened& what);
+MessageSubject subject(const EventRecord& what);
 
 /// Returns "slave 3 (x-axis)", or "slave at position 3" where the setup does not name it. [setup]
 std::string slave_words(std::uint32_t slave, const master::Setup& setup);

@@ -619,10 +619,10 @@ private:
     std::unique_ptr<master::GatewaySlaves> gateway_slaves_;
     std::unique_ptr<master::Gateway> gateway_;
     bool slaves_changed_ = false;
-    hal::Reporter<config::Happened> reporter_{name_, [this](const config::Happened& h) {
+    hal::Reporter<config::EventRecord> reporter_{name_, [this](const config::EventRecord& h) {
         return config::event_words(h, bus_.setup, bus_.link, bus_.backup,
                                    bus_.lcec ? config::Format::lcec : config::Format::ethercat);
-    }, 256, [](const config::Happened& h, const std::string&) { return config::subject(h); }};
+    }, 256, [](const config::EventRecord& h, const std::string&) { return config::subject(h); }};
     std::vector<hal::LastingFault> slave_faults_, clock_faults_, data_faults_;  // by slave
     hal::LastingFault period_fault_, unknown_fault_, nobody_fault_, link_fault_, other_fault_;
     hal::LastingFault jump_fault_;  // of a reference clock that the configuration does not name

@@ -42,7 +42,7 @@ mode 1 swapped
 3 private us 0x110
 )";
 
-struct Happened {
+struct EventRecord {
     Event event;
     std::uint32_t who, id;
     Time value;
@@ -70,7 +70,7 @@ struct Member final : Sink {
     }
     std::size_t times(Event e) const {
         return static_cast<std::size_t>(std::count_if(
-            events.begin(), events.end(), [&](const Happened& h) { return h.event == e; }));
+            events.begin(), events.end(), [&](const EventRecord& h) { return h.event == e; }));
     }
     std::size_t count(std::uint32_t id) const {
         return static_cast<std::size_t>(std::count_if(
@@ -80,7 +80,7 @@ struct Member final : Sink {
     std::unique_ptr<can::Link> link;
     Station station;
     std::vector<Seen> received, sent;
-    std::vector<Happened> events;
+    std::vector<EventRecord> events;
 };
 
 struct Bus {

@@ -91,7 +91,7 @@ TEST(Node_in_a_slow_thread, without_windows_counts_and_reports_the_turns_that_it
         }
         EXPECT_EQ(missed, motor.times(Event::slot_missed));
         ASSERT_GT(missed, 100U);
-        for (const test::Happened& h : motor.events) {
+        for (const test::EventRecord& h : motor.events) {
             if (h.event == Event::slot_missed) {
                 EXPECT_TRUE(h.id == 0x10A && h.value == period);
             }

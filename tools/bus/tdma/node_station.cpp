@@ -247,7 +247,7 @@ void TdmaStation::look() noexcept {
     if (applicant_) {
         applicant_->work(now);
     }
-    for (tdma::Happened h; reported_.pop(h);) {
+    for (tdma::EventRecord h; reported_.pop(h);) {
         if (const std::string sentence = texts_.line(h); !sentence.empty()) {
             log_.print(tdma::subject(h), sentence, now);
         }

@@ -61,7 +61,7 @@ private:
 
     const tdma::config::Schedule schedule_;  // empty if received from the master
     const tdma::EventTexts texts_{schedule_, "start this node again"};
-    hal::Queue<tdma::Happened> reported_{64};  // filled by the loop
+    hal::Queue<tdma::EventRecord> reported_{64};  // filled by the loop
     const hal::LinePrefix prefix_;
     hal::MessageLog log_{prefix_};
     std::optional<unsigned> slot_;  // slot of its frames, if chosen by the station

@@ -70,7 +70,7 @@ inline constexpr bus::EventRow<Event> event_rows[] = {
 static_assert(bus::in_order(event_rows));
 
 /// An event as the cycle records it.
-struct Happened {
+struct EventRecord {
     Event event = Event::running;
     std::uint32_t who = no_node;
     std::uint32_t id = 0;
@@ -106,13 +106,13 @@ public:
     }
 
     /// Formats the line of an event. [setup]
-    std::string line(const Happened& h) const {
+    std::string line(const EventRecord& h) const {
         return bus::format(event_rows[static_cast<std::size_t>(h.event)].text, bus::Text::line,
                            [&](std::string_view name) { return value_of(name, h); });
     }
     /// Subject for rate limiting. The identifier is the detail: frames with random ones are one
     /// kind. [setup]
-    static MessageSubject subject(const Happened& h, const std::string&) {
+    static MessageSubject subject(const EventRecord& h, const std::string&) {
         return {std::to_string(static_cast<int>(h.event)), std::to_string(h.id)};
     }
     /// Returns the fault of an event; nullptr when it raises none. [realtime]
@@ -145,7 +145,7 @@ private:
         if (name == "owner") return "; its sender is not in the table";
         return value_of(name, {event, no_node, 0, 0});
     }
-    std::string value_of(std::string_view name, const Happened& h) const {
+    std::string value_of(std::string_view name, const EventRecord& h) const {
         if (name == "value") return std::to_string(h.value);
         if (name == "us") return microseconds(std::abs(h.value));
         if (name == "side") return h.value > 0 ? "late" : "early";
@@ -190,13 +190,13 @@ private:
         if (node >= t_.nodes.size()) return "node ?";
         return "node " + t_.nodes[node].name;
     }
-    std::string rejection(const Happened& h) const {
+    std::string rejection(const EventRecord& h) const {
         const std::string node = name_of(h.who);
         const bool silent = static_cast<Answer::Reason>(h.value) == Answer::Reason::offline;
         return node + (silent ? " did not answer; check that it runs with the same table"
                               : " has no such mode");
     }
-    std::string rule(const Happened& h) const {
+    std::string rule(const EventRecord& h) const {
         if (is_reserved(h.id)) return "reserved identifier; use 0x010..0x77F";
         return "identifier of node " + t_.nodes[h.who].name + "; use one of node " + own_;
     }

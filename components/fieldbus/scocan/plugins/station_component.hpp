@@ -30,9 +30,9 @@ public:
         texts_.emplace(t, arguments_.own, "setp " + name_ + ".reset TRUE");
         station_ = std::make_unique<Station>(t, arguments_.own, arguments_.options(),
                                              static_cast<Sink&>(*this));
-        reporter_ = std::make_unique<hal::Reporter<Happened>>(name_, [this](const Happened& h) {
-            return texts_->line(h);
-        }, 256, &EventTexts::subject);
+        reporter_ = std::make_unique<hal::Reporter<EventRecord>>(
+            name_, [this](const EventRecord& h) { return texts_->line(h); }, 256,
+            &EventTexts::subject);
         for (const Message& m : t.messages) {
             const bool is_own = m.node == arguments_.own;
             if (is_own && t.nodes[m.node].role != Role::bridge) {
@@ -295,7 +295,7 @@ protected:
     std::vector<ReceivedMessage*> by_id_ = std::vector<ReceivedMessage*>(identifiers, nullptr);
     std::optional<EventTexts> texts_;
     std::unique_ptr<Station> station_;
-    std::unique_ptr<hal::Reporter<Happened>> reporter_;  // behind the texts that its thread uses
+    std::unique_ptr<hal::Reporter<EventRecord>> reporter_;  // behind the texts that its thread uses
     std::shared_ptr<can::SlotExchange> exchange_;
     std::unique_ptr<can::Link> link_;
     hal::LastingFault fault_;

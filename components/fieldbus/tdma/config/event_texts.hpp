@@ -86,7 +86,7 @@ inline constexpr bus::EventRow<Event> event_rows[] = {
 static_assert(bus::in_order(event_rows));
 
 /// An event as the cycle records it.
-struct Happened {
+struct EventRecord {
     Event event = Event::running;
     Address who{};
     Time value = 0;
@@ -94,7 +94,7 @@ struct Happened {
 
 /// Returns the subject for rate limiting. The station is the detail: frames with random addresses
 /// are one kind. [setup]
-inline MessageSubject subject(const Happened& h) {
+inline MessageSubject subject(const EventRecord& h) {
     return {std::to_string(static_cast<int>(h.event)), ethernet::to_string(h.who)};
 }
 
@@ -116,13 +116,13 @@ public:
         : schedule_(schedule), again_(std::move(again)), known_as_(std::move(known_as)) {}
 
     /// Formats the line of an event. [setup]
-    std::string line(const Happened& h) const {
+    std::string line(const EventRecord& h) const {
         return bus::format(event_rows[static_cast<std::size_t>(h.event)].text, bus::Text::line,
                            [&](std::string_view name) { return value_of(name, h); });
     }
 
 private:
-    std::string value_of(std::string_view name, const Happened& h) const {
+    std::string value_of(std::string_view name, const EventRecord& h) const {
         if (name == "who") return called(h.who);
         if (name == "address") return ethernet::to_string(h.who);
         if (name == "value") return std::to_string(h.value);

@@ -16,8 +16,8 @@ public:
     Reporter(const std::string& instance, const config::Schedule& schedule,
              std::string known_as = {})
         : texts_(schedule, "setp " + instance + ".reset TRUE", std::move(known_as)),
-          reported_(instance, [this](const Happened& h) { return texts_.line(h); }, 256,
-                    [](const Happened& h, const std::string&) { return subject(h); }) {}
+          reported_(instance, [this](const EventRecord& h) { return texts_.line(h); }, 256,
+                    [](const EventRecord& h, const std::string&) { return subject(h); }) {}
 
     void start() { reported_.start(); }  // [setup]
     void stop() noexcept { reported_.stop(); }  // [setup]
@@ -28,7 +28,7 @@ public:
 
 private:
     const EventTexts texts_;
-    hal::Reporter<Happened> reported_;  // the last: its thread uses the texts
+    hal::Reporter<EventRecord> reported_;  // the last: its thread uses the texts
 };
 
 }  // namespace hal::tdma
