@@ -4,7 +4,9 @@
 
 Each rule is a pattern and the term to use. Checked are string literals and comments of sources, whole pages, netlists and expected outputs.
 Not checked are identifiers: in code, in backticks, with a hyphen (thread-refused), or as the only word of a string (a key, a pin); except those of
-the installed headers, whose parts have a vocabulary of their own. A line that quotes somebody else's output ends with the comment `language: quoted`."""
+the installed headers, whose parts have a vocabulary of their own. A line that quotes somebody else's output ends with the comment `language: quoted`.
+"""
+
 import re
 import sys
 from pathlib import Path
@@ -122,10 +124,10 @@ def texts(path, source):
 
 
 def is_identifier(text, match):
-    """Returns whether the match is a name and not prose: in backticks, part of a hyphenated name, an attribute, or the only word of a string."""
+    """Returns whether the match is a name and not prose: in backticks, part of a hyphenated name, a member, or the only word of a string."""
     before, after = text[: match.start()][-1:], text[match.end() :][:1]
     alone = before == after and before in ("`", '"', "'") and " " not in match.group()
-    return alone or before == "-" or after == "-" or text[: match.start()].endswith("self.")
+    return alone or before == "-" or after == "-" or text[: match.start()].endswith(("self.", "->"))
 
 
 def identifiers(name, source):
