@@ -153,7 +153,7 @@ int execute_and_show(const SimOptions& options, HostedMachine& machine, TrackedO
     return status;
 }
 
-/// Prints what --report or the summary says of the run that ends.
+/// Prints the report of the run that ends, or its summary.
 void report_run(const SimOptions& options, HostedMachine& machine, bool has_output,
                 std::chrono::steady_clock::duration wall) {
     if (options.report) {

@@ -168,7 +168,7 @@ void ControllerMonitor::publish_figures(const Interface& now) {
     }
 }
 
-/// Error frames report the state of an interface whose driver does not tell it: such a one is
+/// Error frames report the state of an interface whose driver has no state: such a one is
 /// active when it returns.
 State ControllerMonitor::publish_state(const Interface& now, State before) {
     if (now.has_state) {
