@@ -13,6 +13,7 @@ namespace {
 
 constexpr std::size_t chunk_bytes = std::size_t{256} << 10;
 constexpr std::size_t max_chunks = 65536;
+constexpr std::size_t opened_at_once = 8;  // 2 MiB: a huge page; divides max_chunks
 constexpr std::size_t max_block = chunk_bytes / 16;  // larger ones leave too much of a chunk unused
 constexpr std::size_t min_alignment = alignof(std::max_align_t);
 constexpr std::size_t max_alignment = 4096;  // that of a chunk is at least a page
@@ -27,8 +28,7 @@ public:
         const std::lock_guard lock(mutex_);
         if (begin_.load(std::memory_order_relaxed)) return true;
         constexpr int flags = MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE;
-        void* const memory =
-            ::mmap(nullptr, max_chunks * chunk_bytes, PROT_READ | PROT_WRITE, flags, -1, 0);
+        void* const memory = ::mmap(nullptr, max_chunks * chunk_bytes, PROT_NONE, flags, -1, 0);
         if (memory == MAP_FAILED) return false;
         // fewer page faults and TLB misses; where there are none, small pages do
         static_cast<void>(::madvise(memory, max_chunks * chunk_bytes, MADV_HUGEPAGE));
@@ -50,7 +50,9 @@ public:
         if (chunk) {
             free_ = *reinterpret_cast<char**>(chunk);
         } else if (made_ < max_chunks) {
-            chunk = begin + made_++ * chunk_bytes;
+            chunk = begin + made_ * chunk_bytes;
+            if (made_ % opened_at_once == 0 && !make_accessible(chunk)) return nullptr;
+            ++made_;
         } else {
             return nullptr;
         }
@@ -74,6 +76,11 @@ public:
     }
 
 private:
+    /// Not all at once: a program that locks its memory would get the whole range.
+    static bool make_accessible(char* chunk) {
+        return ::mprotect(chunk, opened_at_once * chunk_bytes, PROT_READ | PROT_WRITE) == 0;
+    }
+
     std::atomic<std::uint32_t>& live_of(const char* chunk) {
         const char* const begin = begin_.load(std::memory_order_relaxed);
         return live_[static_cast<std::size_t>(chunk - begin) / chunk_bytes];

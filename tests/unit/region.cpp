@@ -6,6 +6,8 @@
 #include <cstring>
 #include <gtest/gtest.h>
 #include <memory>
+#include <sys/mman.h>
+#include <sys/resource.h>
 #include <thread>
 #include <vector>
 
@@ -45,6 +47,17 @@ TEST(Region, Has_the_blocks_of_nested_scopes_side_by_side) {
     region::release(first, 1);
     region::release(second, 17);
     region::release(third, 1);
+}
+
+TEST(Region, Is_not_resident_as_a_whole_in_a_program_that_locks_its_memory) {
+    const region::Scope scope;
+    void* const block = block_of_bytes(16);
+    if (::mlockall(MCL_CURRENT) != 0) GTEST_SKIP() << "memory cannot be locked";
+    ::munlockall();
+    rusage usage{};
+    ::getrusage(RUSAGE_SELF, &usage);
+    EXPECT_LT(usage.ru_maxrss, 2'000'000);  // KiB
+    region::release(block, 16);
 }
 
 TEST(Region, Leaves_large_and_widely_aligned_blocks_to_others) {
