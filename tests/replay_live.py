@@ -1,16 +1,18 @@
 # SPDX-License-Identifier: MIT
 """Runs machines live under load and edits, executes their journals again, and prints what differs.
 
-    replay_live.py [HAL] [--seconds 60] [--random 20] [--edits 200] [--setp 1000] [MACHINE...]
+    replay_live.py [HAL] [--seconds 60] [--random 20] [--edits 200] [--setp 1000] [--jobs 1] [--seed 1] [MACHINE...]
 
-MACHINE is a netlist of halfiles, as canopen-axis/axis.hal; without one all of them that start on this computer. Each runs for the
-time, while two processes load the CPUs, the machine is suspended for moments, values are set, signals, instances and functions
+MACHINE is a netlist of halfiles, as canopen-axis/axis.hal; without one all of them that start on this computer. --jobs of them run side by side, each for
+the time, while two processes load the CPUs, the machine is suspended for moments, values are set, signals, instances and functions
 are added and removed, a component is reloaded, each bus in memory loses its cable for a moment, and a process is killed: the drive
 of a random netlist, which is started again, or one that the machine has started. The exit status is 0 when no bit of any value
 differs in any cycle.
 """
 
 import argparse
+import concurrent.futures
+import contextlib
 import os
 import random
 import re
@@ -27,6 +29,7 @@ from program import ROOT, environment, program
 HALFILES = ROOT / "halfiles"
 WRITABLE = re.compile(r"(?m)^\s*\S+\s+(bit|float|s32|u32)\s+IN\s+\S+\s+(\S+)$")
 BUSY = "while True: pass"
+STARVED = "[starved-thread]"  # of an error that rejects the netlist
 # Components with inputs and outputs of type float.
 PARTS = {
     "sum2": (["in0", "in1"], ["out"]),
@@ -59,7 +62,8 @@ ETHERNET = re.compile(r"loadrt (ethercat_segment|tdma)\b|^\[(ethercat|tdma)")
 def random_netlist(dice):
     """Three threads, up to sixty instances, and links between any two of them."""
     lines = [
-        "loadrt threads name1=fast period1=500000 name2=servo period2=1000000 name3=slow period3=7000000"
+        "loadrt threads name1=fast period1=500000 supervise1=60s name2=servo period2=1000000 supervise2=60s "
+        "name3=slow period3=7000000 supervise3=60s"
     ]
     inputs, outputs, functions = [], [], []
     for kind, (ins, outs) in PARTS.items():
@@ -108,6 +112,7 @@ class Machine:
         self.process = None
         self.drive = None
         self.happened = []
+        self.cycles = self.edits = self.values = 0  # executed again
 
     def start_drive(self):
         """Starts drive.hal, the node of a random netlist."""
@@ -208,8 +213,10 @@ class Machine:
         parts = 20
         for part in range(parts):
             lines = [self.setting(dice, pins) for _ in range(options.setp // parts) if pins]
-            for n in range(options.edits // parts // 4):
-                name = f"live-{part}-{n}"
+            for n in range(
+                part * options.edits // parts // 4, (part + 1) * options.edits // parts // 4
+            ):
+                name = f"live-{n}"
                 lines += [f"loadrt sum2 names={name}", f"addf {name} {dice.choice(threads)}"]
                 lines += [f"net {name} {name}.out", f"delf {name}"]
             if part == parts // 2:
@@ -252,7 +259,10 @@ def verdict(name, machine, error):
         print(f"{name}: does not run by itself: no cycle")
         return None
     count = f"{executed[1]}, {executed[2]}" if executed else "nothing"
+    if executed:
+        machine.cycles, machine.edits = (int(one.split()[0]) for one in executed.groups())
     if status == 0 and same:
+        machine.values = int(same[2] or 0)
         has_values = same[2] not in (None, "0")  # a busy disk may have lost all rows
         what = f"{same[2]} values compared" if has_values else "compared by checksums"
         happened = "".join(f", {one}" for one in machine.happened)
@@ -264,63 +274,82 @@ def verdict(name, machine, error):
     return True
 
 
-def run_one(hal, name, prepare, options, dice):
-    """Returns whether something differs; None: it does not start here."""
+@contextlib.contextmanager
+def busy_cpus():
+    """Two processes compute meanwhile."""
+    busy = [subprocess.Popen([sys.executable, "-c", BUSY]) for _ in range(2)]
+    try:
+        yield
+    finally:
+        for process in busy:
+            process.kill()
+            process.wait()
+
+
+def run_one(hal, name, prepare, options):
+    """Returns the machine and whether something differs; None: it does not start here."""
+    for _ in range(5):
+        machine, differs, is_starved = attempt(hal, name, prepare, options)
+        if not is_starved:
+            break
+    return machine, differs
+
+
+def attempt(hal, name, prepare, options):
+    """As run_one, and whether a thread got no CPU time while the netlist was loaded."""
+    dice = random.Random(f"{options.seed} {name}")
     with tempfile.TemporaryDirectory(prefix="hal-live-") as folder:
         folder = Path(folder)
-        netlist, ini = prepare(folder)
+        netlist, ini = prepare(folder, dice)
         machine = Machine(hal, netlist.parent, netlist.name, ini)
         for values in (True, False):  # too many cannot be recorded
             why = machine.start(values)
             if "--values: " not in why:
                 break
+        error = why
+        if not why:
+            try:
+                machine.disturb(options, dice)
+            finally:
+                error = machine.stop()
+        if STARVED in error:
+            print(f"{name}: a thread had no CPU time at the start", flush=True)
+            return machine, None, True
         if why:
             lines = why.splitlines()
             first = next((line for line in lines if "error" in line), lines[-1])
             print(f"{name}: does not start here: {first}", flush=True)
-            return None
-        busy = [subprocess.Popen([sys.executable, "-c", BUSY]) for _ in range(2)]
-        try:
-            machine.disturb(options, dice)
-        finally:
-            for process in busy:
-                process.kill()
-                process.wait()
-            error = machine.stop()
+            return machine, None, False
         if not (machine.folder / "run.mcap").exists():
             last = (error.strip().splitlines() or ["it wrote nothing"])[-1]
             print(f"{name}: ended without a journal: {last}", flush=True)
-            return True
+            return machine, True, False
         differs = verdict(name, machine, error)
         if differs and options.keep:
             shutil.copytree(
                 netlist.parent, Path(options.keep) / name.replace("/", "-"), dirs_exist_ok=True
             )
-        return differs
+        return machine, differs, False
 
 
 def prepare_machine(path):
-    def prepare(folder):
+    def prepare(folder, dice):
+        shutil.copytree(HALFILES, folder, dirs_exist_ok=True)  # machines use files of others
         copy = folder / path.parent.name
-        shutil.copytree(path.parent, copy)
-        beside = sorted(copy.glob("*.ini"))
+        beside = [*copy.glob(f"{path.stem}.ini"), *sorted(copy.glob("*.ini"))]
         return copy / path.name, beside[0].name if beside else None
 
     return prepare
 
 
-def prepare_text(text, dice):
+def prepare_random(folder, dice):
     group = f"239.{dice.randrange(1, 255)}.{dice.randrange(256)}.{dice.randrange(1, 255)}"
     bus = f"udp:{group}%lo:{os.getpid() % 40000 + 20000}"
-
-    def prepare(folder):
-        (folder / "random.hal").write_text(text)
-        (folder / "drive.hal").write_text(DRIVE.format(bus=bus))
-        settings = (HALFILES / "canopen-axis" / "axis.canopen").read_text()
-        (folder / "axis.canopen").write_text(settings.replace("sim:axis", bus))
-        return folder / "random.hal", None
-
-    return prepare
+    (folder / "random.hal").write_text(random_netlist(dice))
+    (folder / "drive.hal").write_text(DRIVE.format(bus=bus))
+    settings = (HALFILES / "canopen-axis" / "axis.canopen").read_text()
+    (folder / "axis.canopen").write_text(settings.replace("sim:axis", bus))
+    return folder / "random.hal", None
 
 
 def main():
@@ -335,24 +364,28 @@ def main():
         ("edits", 200),
         ("setp", 1000),
         ("seed", 1),
+        ("jobs", 1),
     ]:
         options.add_argument(f"--{name}", type=type(value), default=value)
     options.add_argument("--keep", help="folder for the journals that differ")
     options.add_argument("machines", nargs="*")
     options = options.parse_args(arguments)
-    dice = random.Random(options.seed)
     chosen = [HALFILES / name for name in options.machines]
     machines = chosen or sorted(HALFILES.glob("*/*.hal"))
     todo = [(str(path.relative_to(HALFILES)), prepare_machine(path)) for path in machines]
-    todo += [
-        (f"random {n}", prepare_text(random_netlist(dice), dice)) for n in range(options.random)
-    ]
-    results = [run_one(hal, name, prepare, options, dice) for name, prepare in todo]
-    run = [one for one in results if one is not None]
+    todo += [(f"random {n}", prepare_random) for n in range(options.random)]
+    with busy_cpus(), concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
+        results = list(pool.map(lambda one: run_one(hal, *one, options), todo))
+    run = [machine for machine, differs in results if differs is not None]
+    differing = sum(differs for _, differs in results if differs is not None)
     print(
-        f"{len(run)} machines executed again, {sum(run)} differ, {len(results) - len(run)} do not start here"
+        f"{len(run)} machines executed again, {differing} differ, {len(results) - len(run)} do not start here"
     )
-    return 1 if sum(run) or not run else 0
+    cycles, edits, values = (
+        sum(getattr(one, what) for one in run) for what in ("cycles", "edits", "values")
+    )
+    print(f"{cycles} cycles, {edits} edits and settings, {values} values compared")
+    return 1 if differing or not run else 0
 
 
 if __name__ == "__main__":
