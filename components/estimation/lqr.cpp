@@ -10,6 +10,7 @@
 #include "estimation/matrices.hpp"
 #include "hal/background.hpp"
 #include "hal/component.hpp"
+#include "hal/journal.hpp"
 #include "hal/limit.hpp"
 #include "hal/queue.hpp"
 #include "hal/retained.hpp"
@@ -43,6 +44,15 @@ struct Delivery {
     Matrix gain;
     bool good = false;
     std::uint32_t number = 0;
+
+    /// Exchanges a gain with the journal that is as large as `gain` is now. [realtime]
+    void exchange() noexcept {
+        hal::journaled(good);
+        hal::journaled(number);
+        if (good) {
+            hal::journaled(gain.data(), static_cast<std::size_t>(gain.size()));
+        }
+    }
 };
 
 /// Solves the Riccati equation outside of the cycle. The cycle is the only writer of orders and the
@@ -50,7 +60,10 @@ struct Delivery {
 class Designer {
 public:
     explicit Designer(Problem problem) : problem_(std::move(problem)) {}
-    void start() { background_.start(); }  ///< [setup]
+    void start() {  ///< [setup]
+        const hal::JournaledSource journaled;
+        background_.start();
+    }
     void stop() noexcept { background_.stop(); }  ///< [setup]
 
     hal::Mailbox<Order> orders;
@@ -151,16 +164,7 @@ public:
 
     void update(hal::Cycle cycle) noexcept {
         order(cycle);
-        bool fresh = false;
-        if (const Delivery& delivery = designer_.deliveries.get(&fresh); fresh) {
-            rejected = !delivery.good;
-            designing = delivery.number != order_.number;
-            if (delivery.good) {
-                gain_ = delivery.gain;
-                designs = designs + 1;
-                show();
-            }
-        }
+        take_delivery();
         bool numbers = true;
         for (std::size_t i = 0; i < x.size(); ++i) {
             const double off = x[i] - target[i];
@@ -250,6 +254,23 @@ private:
         }
         return p;
     }
+    void take_delivery() noexcept {
+        bool fresh = false;
+        const Delivery& newest = designer_.deliveries.get(&fresh);
+        hal::journaled(fresh);
+        if (!fresh) return;
+        delivery_ = newest;
+        if (delivery_.gain.size() != gain_.size()) {
+            delivery_.gain = gain_;  // executed again: the recorded one follows
+        }
+        delivery_.exchange();
+        rejected = !delivery_.good;
+        designing = delivery_.number != order_.number;
+        if (!delivery_.good) return;
+        gain_ = delivery_.gain;
+        designs = designs + 1;
+        show();
+    }
     void order(hal::Cycle cycle) noexcept {
         bool changed = problem_.plant == Plant::sampled && cycle.period_ns() != order_.period_ns;
         for (std::size_t i = 0; i < q_.size(); ++i) {
@@ -314,6 +335,7 @@ private:
     Matrix gain_;
     Vector state_;
     Order order_;
+    Delivery delivery_;  // of this cycle
     std::uint32_t blind_ = 0;  // consecutive cycles with a NaN or infinite state
     Designer designer_;
 };

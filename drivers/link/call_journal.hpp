@@ -12,26 +12,17 @@
 #include <string>
 #include <type_traits>
 
-// Defined by a program with journals (runtime/machine/run/setup_journal.cpp), null in others. They
-// are about the calling thread: the function that its cycle runs, or the setup call of a component
-// that it makes. [realtime] in a cycle
+#include "hal/journal.hpp"
+
+// Defined by a program with journals (runtime/machine/run/setup_journal.cpp), null in others, as those
+// of hal/journal.hpp. [realtime] in a cycle
 extern "C" {
-/// 0: there is no journal; 1: results are recorded; 2: they are given back
-[[gnu::weak, gnu::visibility("default")]] int hal_journal_mode() noexcept;
-/// Appends the bytes of a result.
-[[gnu::weak, gnu::visibility("default")]] void hal_journal_put(const void* bytes,
-                                                               std::size_t size) noexcept;
-/// Takes the bytes of a result. Returns 0, with zeros, when the journal has no more.
-[[gnu::weak, gnu::visibility("default")]] int hal_journal_get(void* bytes,
-                                                              std::size_t size) noexcept;
 /// The link has sent other frames than in the journal. The text outlives the cycle.
 [[gnu::weak, gnu::visibility("default")]] void hal_journal_differs(const char* link) noexcept;
 /// Not 0: clocks are read by a driver, whose results are recorded. Returns what it was before.
 [[gnu::weak, gnu::visibility("default")]] int hal_journal_hide(int hidden) noexcept;
 /// Notes that an ordered call begins; when executed again, waits for those before it.
 [[gnu::weak, gnu::visibility("default")]] void hal_journal_order() noexcept;
-/// 1: a link is opened; 0: it is open. Its descriptors and threads are not the component's.
-[[gnu::weak, gnu::visibility("default")]] void hal_journal_link(int begins) noexcept;
 }
 
 namespace hal::link {

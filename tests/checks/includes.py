@@ -75,7 +75,7 @@ ROWS = {
     "tools/panel": ["tools/cli", "components/recording/mcap"],
     "tools/lsp": ["tools/run", "tools/doc", "tools/panel"],
     "tools/python": ["runtime/control"],
-    "drivers/link": [],
+    "drivers/link": ["runtime/sdk"],
     "drivers/discipline": ["drivers/link", "runtime/sdk"],
     "drivers/capture": ["drivers/link"],
     "drivers/netlink": ["drivers/link"],

@@ -16,8 +16,6 @@ WITHOUT_STATE = {
     "dds_subscribe": OPENS,
     "node": OPENS,
     "segment_record": OPENS,
-    "lqr": HELPERS,  # after a change of its matrices
-    "modbus": HELPERS,
     "vision_blob": HELPERS,
     "vision_line": HELPERS,
     "vision_marker": HELPERS,

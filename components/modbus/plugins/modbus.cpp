@@ -8,11 +8,12 @@
 #include "bus/guardian/report.hpp"
 #include "bus/guardian/report_lock.hpp"
 #include "hal/background.hpp"
+#include "hal/journal.hpp"
 #include "hal/reporter.hpp"
 #include "hal/setup_time.hpp"
-#include "link/call_journal.hpp"
 #include "modbus/guardian/guardian_process.hpp"
 #include "modbus/master/event_texts.hpp"
+#include "modbus/master/followed_image.hpp"
 #include "modbus/master/local_master.hpp"
 #include "modbus_arguments.hpp"
 #include "slave_pins.hpp"
@@ -57,7 +58,7 @@ struct Modbus : hal::bus::BusComponent {
         const auto* host = hal::extension<hal_background>(HAL_BACKGROUND);
         is_virtual_ = host != nullptr && host->is_virtual != 0;
         const hal::line::Description line = hal::line::describe(arguments_.bus.link);
-        const bool replays = hal::link::journal_mode() == hal::link::JournalMode::executes_again;
+        const bool replays = hal::is_executed_again();
         if (is_virtual_ && !line.in_memory && !replays) {
             throw std::runtime_error("'" + arguments_.bus.link +
                                      "' is a real line, and a simulation has no time in which its "
@@ -65,12 +66,15 @@ struct Modbus : hal::bus::BusComponent {
         }
         has_guardian_ = !is_virtual_ && !line.in_memory && arguments_.bus.guardian &&
                         arguments_.bus.has_stops();
+        hal::journaled(has_guardian_);
+        const hal::JournaledSource journaled;  // FollowedImage, alive_
         if (has_guardian_ && !replays) {
             start_guardian();
         } else {
-            // the values of a line are not in a journal, and replaying one opens no real line
+            // a re-execution opens no real line: what the cycle sees of it is in the journal
             start_local(replays ? "sim:replay" : arguments_.bus.link);
         }
+        followed_.attach(image_, arguments_.bus, arguments_.plan);
         setup_time_.start();
         begin_cycles();
         is_alive_.store(true);
@@ -92,6 +96,7 @@ struct Modbus : hal::bus::BusComponent {
         }
         background_.stop();
         end_guardian();
+        followed_.take();
         drain_events();
         if (reporter_) {
             reporter_->stop();
@@ -105,6 +110,9 @@ struct Modbus : hal::bus::BusComponent {
     void receive(hal::Cycle cycle) noexcept {
         if (!has_image_) return;
         const std::int64_t now = cycle.start_ns();
+        followed_.take();
+        alive_ = is_alive_.load(std::memory_order_acquire);
+        hal::journaled(alive_);
         ImageHeader& header = image_.header();
         header.cycles.count(std::max(arguments_.bus.heartbeat_ns, 3 * cycle.period_ns()));
         const hal::bus::Turn turn = receive_turn(cycle);
@@ -132,13 +140,15 @@ struct Modbus : hal::bus::BusComponent {
         const std::int64_t now = cycle.start_ns();
         ImageHeader& header = image_.header();
         follow_estop();
+        followed_.take();
+        const ImageHeader& seen = followed_.seen().header();
         const bool may_run = exchanges() &&
-                             header.phase.load(std::memory_order_acquire) ==
+                             seen.phase.load(std::memory_order_acquire) ==
                                  static_cast<std::uint32_t>(Phase::running) &&
-                             !header.requests.holds_any();
+                             !seen.requests.holds_any();
         bool invalid = set_points_.transmit(image_);
         for (SlavePins* drive : drives_) {
-            invalid = drive->command(image_, now, may_run) || invalid;
+            invalid = drive->command(followed_.seen(), image_, now, may_run) || invalid;
         }
         record_invalid_inputs(invalid);
         header.outputs_valid.store(1, std::memory_order_release);
@@ -155,19 +165,18 @@ struct Modbus : hal::bus::BusComponent {
 private:
     /// Returns whether the guardian, if there is one, exchanges telegrams. [realtime]
     bool exchanges() const noexcept {
-        return is_alive_.load(std::memory_order_relaxed) &&
-               !guardian_stalls_.load(std::memory_order_relaxed);
+        return alive_ && !guardian_stalls_.load(std::memory_order_relaxed);
     }
     /// `elapsed`: time since the last cycle, as far as this thread ran. [realtime]
     void watch_guardian(std::int64_t elapsed_ns) noexcept {
-        if (!guardian_) return;
-        if (!is_alive_.load(std::memory_order_acquire)) {
+        if (!has_guardian_) return;
+        if (!alive_) {
             if (!guardian_fault_.lasts()) {
                 tell({Event::guardian_lost, 0, 0, 0});
             }
             return;
         }
-        const std::uint64_t turns = image_.header().turns.load(std::memory_order_relaxed);
+        const std::uint64_t turns = followed_.seen().header().turns.load(std::memory_order_relaxed);
         guardian_silent_ns_ = turns == guardian_turns_ ? guardian_silent_ns_ + elapsed_ns : 0;
         guardian_turns_ = turns;
         const bool stalls = guardian_silent_ns_ > stall_ns;
@@ -312,7 +321,7 @@ private:
 
     void drain_events() noexcept {
         if (!has_image_) return;
-        for (EventRecord record; image_.pop(record);) {
+        for (EventRecord record; followed_.pop(record);) {
             tell(record);
         }
     }
@@ -348,13 +357,13 @@ private:
     }
 
     void show(std::int64_t now, bool is_alive, bool refresh) noexcept {
-        const ImageHeader& header = image_.header();
+        const ImageHeader& header = followed_.seen().header();
         refresh = refresh || is_alive != was_alive_;
         was_alive_ = is_alive;
         show_slaves(is_alive, refresh);
         ages_.show(now);
         for (SlavePins* drive : drives_) {
-            drive->show_drive(image_);
+            drive->show_drive(followed_.seen());
         }
         online = online_slaves_ == slaves_.size() && is_alive;
         fault = lasting_faults_ != 0;
@@ -371,7 +380,7 @@ private:
     void show_slaves(bool is_alive, bool refresh) noexcept {
         for (std::size_t word = 0; word < ImageHeader::slave_words && word * 64 < slaves_.size();
              ++word) {
-            std::uint64_t changed = image_.take_changed(word);
+            std::uint64_t changed = followed_.seen().take_changed(word);
             if (refresh) {
                 const std::size_t count = std::min<std::size_t>(64, slaves_.size() - word * 64);
                 changed = ~std::uint64_t{0} >> (64 - count);
@@ -379,7 +388,7 @@ private:
             for (; changed != 0; changed &= changed - 1) {
                 SlavePins& slave = slaves_[word * 64 + std::countr_zero(changed)];
                 online_slaves_ -= slave.is_online() ? 1 : 0;
-                slave.show(image_, is_alive);
+                slave.show(followed_.seen(), is_alive);
                 online_slaves_ += slave.is_online() ? 1 : 0;
             }
         }
@@ -453,12 +462,14 @@ private:
 
     std::vector<std::byte> memory_;  // of the image of a local master
     Image image_;
+    FollowedImage followed_;  // by the cycle
     bool has_image_ = false;
     std::unique_ptr<LocalMaster> local_;
     hal::bus::ReportLock lock_;
     std::unique_ptr<GuardianProcess> guardian_;
     hal::Background background_{[this](std::int64_t now, bool may_wait) { turn(now, may_wait); }};
     std::atomic<bool> is_alive_{true};  // written by the background thread
+    bool alive_ = true;  // what receive() has seen of it
     std::atomic<bool> guardian_stalls_{false};  // written by the cycle
     bool is_stopped_by_another_ = false;  // guardian; of the background thread
     std::uint64_t guardian_turns_ = 0;

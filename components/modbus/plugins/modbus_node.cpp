@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "hal/background.hpp"
+#include "hal/journal.hpp"
 #include "link/system.hpp"
 #include "modbus/device/slave_bus.hpp"
 #include "modbus/master/value_codec.hpp"
@@ -47,11 +48,11 @@ public:
             if (value.in) {
                 value.number.store(*value.in, std::memory_order_relaxed);
             } else {
-                *value.out = value.number.load(std::memory_order_relaxed);
+                *value.out = value.seen(value.number.load(std::memory_order_relaxed));
             }
         }
         if (!rpm_) return;
-        *rpm_ = speed_.load(std::memory_order_relaxed);
+        *rpm_ = seen_speed_(speed_.load(std::memory_order_relaxed));
         blocks_.store(*blocked_, std::memory_order_relaxed);
         if (*trip_ && !was_tripped_) {
             trips_.store(true, std::memory_order_relaxed);
@@ -93,6 +94,7 @@ private:
         std::unique_ptr<hal::In<double>> in;
         std::unique_ptr<hal::Out<double>> out;
         std::atomic<double> number{0.0};  // written by the cycle with `in`, else by the background
+        hal::JournaledValue<double> seen;  // by the cycle
     };
 
     static double number_of(const Value& v, std::uint64_t cell) {
@@ -108,6 +110,7 @@ private:
     std::unique_ptr<hal::Out<double>> rpm_;
     std::unique_ptr<hal::In<bool>> trip_, blocked_;
     std::atomic<double> speed_{0.0};  // written by the background
+    hal::JournaledValue<double> seen_speed_;  // by the cycle
     std::atomic<bool> trips_{false};  // set by the cycle, taken by the background
     std::atomic<bool> blocks_{false};  // written by the cycle
     bool was_tripped_ = false;
@@ -140,7 +143,10 @@ struct ModbusNode : hal::Component {
         if (!arguments_.loaded) {
             throw std::runtime_error("missing configuration: write config=FILE.modbus");
         }
-        auto opened = hal::line::open(arguments_.bus.link, arguments_.bus.line);
+        const hal::JournaledSource journaled;  // by JournaledValue
+        // a re-execution opens no real line
+        auto opened = hal::line::open(hal::is_executed_again() ? "sim:replay" : arguments_.bus.link,
+                                      arguments_.bus.line);
         if (!opened) throw std::runtime_error(opened.problem);
         line_ = std::move(opened.line);
         bus_ = std::make_unique<SlaveBus>(arguments_.bus);
@@ -173,7 +179,7 @@ struct ModbusNode : hal::Component {
         for (NodePins& pins : pins_) {
             pins.update();
         }
-        requests_ = count_.load(std::memory_order_relaxed);
+        requests_ = seen_count_(count_.load(std::memory_order_relaxed));
     }
 
 private:
@@ -202,6 +208,7 @@ private:
     std::atomic<std::uint32_t> faults_{0};  // written by the cycle: kinds, and the slave from bit 8
     std::atomic<double> share_{0.0};  // written by the cycle: of the noise
     std::atomic<std::uint64_t> count_{0};  // written by the background
+    hal::JournaledValue<std::uint64_t> seen_count_;  // by the cycle
 };
 
 }  // namespace

@@ -196,11 +196,13 @@ public:
         show_all(image, image.slave(index_), is_alive);
     }
 
-    /// Commands the drive. Returns whether its speed is not finite. [realtime]
-    bool command(const Image& image, std::int64_t now_ns, bool may_run) noexcept {
+    /// Commands the drive in the image `to`, by what the cycle has seen in `image`. Returns whether
+    /// its speed is not finite. [realtime]
+    bool command(const Image& image, const Image& to, std::int64_t now_ns, bool may_run) noexcept {
         DriveAxis::Feedback feedback;
-        SlaveImage& slave = image.slave(index_);
-        const bool is_stopping = slave.stop_pending.load(std::memory_order_relaxed) != 0;
+        SlaveImage& slave = to.slave(index_);
+        const bool is_stopping =
+            image.slave(index_).stop_pending.load(std::memory_order_relaxed) != 0;
         feedback.is_online = is_online_ && may_run && !is_stopping && !rejects_;
         const std::int64_t read_at_ns =
             speed_ == no_value ? 0 : image.value_stamp(speed_).load(std::memory_order_relaxed);
