@@ -105,6 +105,46 @@ class Machine(Case):
         )
         return out + error
 
+    def test_a_journal_ends_at_the_shared_memory(self):
+        short = self.folder / "short.ngc"
+        short.write_text("G21 G90\nG0 X2 Y-2\nM2\n")
+        machine = subprocess.Popen(
+            [
+                HAL,
+                "linuxcnc",
+                "--journal",
+                "run.mcap",
+                "--values",
+                "*",
+                MACHINE / "cnc.ini",
+                "--",
+                short,
+            ],
+            cwd=self.folder,
+            env=self.environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        self.addCleanup(machine.kill)
+        out, error = machine.communicate(timeout=120)
+        self.assertEqual(0, machine.returncode, out + error)
+        self.assertIn("short.ngc took", out)
+        # until then task has commanded nothing that changes a value
+        done = self.run_program("replay", "--exact", "run.mcap")
+        self.assertEqual(1, done.returncode, done.stdout + done.stderr)
+        self.assertGreater(int(re.match(r"(\d+) cycles of 1 thread", done.stdout)[1]), 500)
+        self.assertRegex(
+            done.stdout,
+            r"\nfirst difference: '[^']+' \('\S+' of motmod, function 'motion-\S+'\) in cycle",
+        )
+        # before it is the whole machine: its bus, its programs' pins and motion
+        newest = int(re.search(r"newest: cycle (\d+)", done.stdout)[1])
+        part = self.run_program("replay", "--exact", "run.mcap", "--until", str(newest - 10))
+        self.assertEqual(0, part.returncode, part.stdout + part.stderr)
+        self.assertRegex(part.stdout, r"no difference so far, \d{5,} values compared")
+
     def test_the_e_stop_ends_the_motion(self):
         long = self.folder / "long.ngc"
         long.write_text("G21 G90\nG1 F600 X90\nM2\n")

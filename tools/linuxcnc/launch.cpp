@@ -171,6 +171,7 @@ bool Launch::start_threads() {
         return false;
     }
     if (!step("start the threads")) return false;
+    if (journal_ && journal_->begin_values(machine_) != 0) return false;
     machine_.start_threads();
     return !machine_.stop.requested();
 }

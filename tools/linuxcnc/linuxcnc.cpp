@@ -38,7 +38,7 @@ int launch(const LinuxcncOptions& options, const Configuration& configuration, M
     ::setenv("PATH", path.c_str(), 1);  // a wrapper in the configuration's bin/ has precedence
     if (!machine.serve(true)) return 1;
     if (journal) {
-        if (const int failed = journal->begin(machine); failed != 0) return failed;
+        journal->begin(machine);
     }
     return Launch(options, configuration, machine, lock, journal).run();
 }

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "cli/option_set.hpp"
 
@@ -12,6 +13,7 @@ namespace hal::tools {
 struct JournalSettings {
     std::string journal;       ///< file
     std::int64_t keep_ns = 0;  ///< of the journal; 0: all of it
+    std::vector<std::string> values;  ///< to be recorded with it: names and patterns
 
     void declare_journal(OptionSet& set) {
         set.value("--journal", journal, "FILE",
@@ -21,10 +23,16 @@ struct JournalSettings {
                      "with --journal: keep the last 10min, 90s …; FILE is written at the end, on a "
                      "fault as FILE-fault-1, and by journal save",
                      1);
+        set.values("--values", values, "NAMES",
+                   "with --journal: record these pins, parameters and signals in every cycle, too; "
+                   "patterns; may be repeated");
     }
     /// Returns what is wrong with them once the lines `journal` of netlists are known, or "".
     std::string journal_problem() const {
-        return keep_ns > 0 && journal.empty() ? "--journal-keep needs --journal FILE" : "";
+        if (!journal.empty()) return "";
+        if (keep_ns > 0) return "--journal-keep needs --journal FILE";
+        if (values.empty()) return "";
+        return "--values needs --journal FILE; hal record records a running machine";
     }
 };
 

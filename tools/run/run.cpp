@@ -70,7 +70,8 @@ int run_plain(HostedMachine& machine, const RunOptions& options, std::vector<Nod
     if ((status != 0 && !options.keep_going) || machine.stop.requested()) return status;
     if (!attach_watchdog(machine, options, service)) return 1;
     if (journal) {
-        if (const int failed = journal->begin(machine); failed != 0) return failed;
+        journal->begin(machine);
+        if (const int failed = journal->begin_values(machine); failed != 0) return failed;
     }
     machine.start_threads();
     const std::string& name = machine.session.options().name;
@@ -129,9 +130,6 @@ int run_machine(const RunOptions& options, RunJournal* journal) {
                     "--dds applies to nodes of a netlist for several machines: add --node NAME; "
                     "dds_publish and dds_subscribe take " +
                         options.dds + " themselves");
-    }
-    if (!options.values.empty() && options.journal.empty()) {
-        return fail(options, "--values needs --journal FILE; hal record records a running machine");
     }
     if (const std::string problem = options.journal_problem(); !problem.empty()) {
         return fail(options, problem);

@@ -17,7 +17,6 @@ namespace hal::tools {
 struct RunOptions : NetlistOptions, JournalSettings {
     std::int64_t for_ns = -1;  ///< -1: not given
     std::string watchdog;      ///< a device of the Linux watchdog API
-    std::vector<std::string> values;  ///< to be recorded with it: names and patterns
     std::string dds;  ///< arguments of the DDS participant: "interfaces=10.0.0.1 domain=3"
     bool interactive = false;
     bool no_picture = false;
@@ -37,9 +36,6 @@ struct RunOptions : NetlistOptions, JournalSettings {
         set.value("--watchdog", watchdog, "DEVICE",
                   "write to this device (/dev/watchdog) while every thread makes progress");
         declare_journal(set);
-        set.values("--values", values, "NAMES",
-                   "with --journal: record these pins, parameters and signals in every cycle, too; "
-                   "patterns; may be repeated");
         set.flag("--no-picture", no_picture, "no live picture in the terminal");
         set.value("--node", part, "NAME",
                   "load the part of this node of a netlist for several machines");
@@ -56,8 +52,10 @@ class RunJournal {
 public:
     virtual ~RunJournal() = default;
     virtual ExecutionSink& sink() = 0;
+    /// Adds the texts of the netlists, and reports from now on that the file cannot be written.
+    virtual void begin(HostedMachine& machine) = 0;
     /// The netlists are loaded: begins to record values. Returns an exit status.
-    virtual int begin(HostedMachine& machine) = 0;
+    virtual int begin_values(HostedMachine& machine) = 0;
     /// The machine is about to shut down: nothing of it is read any more.
     virtual void end_values() = 0;
     /// The machine has ended: completes the file. Returns an exit status.

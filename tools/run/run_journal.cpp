@@ -122,7 +122,7 @@ public:
 
     ExecutionSink& sink() override { return journal_; }
 
-    int begin(HostedMachine& machine) override {
+    void begin(HostedMachine& machine) override {
         journal_.on_failure([this](const std::string& reason) {
             write_all(2, fmt::format("{}: cannot write '{}': {}; the machine goes on without a "
                                      "journal\n",
@@ -142,6 +142,9 @@ public:
                 journal_.attach(path, text);
             }
         }
+    }
+
+    int begin_values(HostedMachine& machine) override {
         const std::vector<std::string> patterns = names_in(options_.values);
         if (patterns.empty()) return 0;
         values_ = std::make_unique<RecordedValues>(machine.session, journal_);
@@ -230,6 +233,10 @@ private:
 int run_journaled(const RunOptions& given) {
     RunOptions options = given;
     add_journal_of_netlists(options);
+    if (!options.values.empty() && !options.journal.empty()) {
+        const std::string problem = problem_of_values(options, options.values);
+        if (!problem.empty()) return fail(options, "--values: " + problem);
+    }
     return run_with_journal(
         options, [&options](RunJournal* journal) { return run_machine(options, journal); });
 }
@@ -247,10 +254,6 @@ int run_with_journal(const RunOptions& options, const std::function<int(RunJourn
         return fail(options,
                     "--journal-keep and --values exclude each other: a journal that begins "
                     "later has no recorded values");
-    }
-    if (!options.values.empty()) {
-        const std::string problem = problem_of_values(options, options.values);
-        if (!problem.empty()) return fail(options, "--values: " + problem);
     }
     FileOfRun journal(options);
     if (const int status = journal.check(); status != 0) return status;
