@@ -6,6 +6,9 @@
 #include <cstring>
 #include <ctime>
 
+#include <sys/resource.h>
+#include <unistd.h>
+
 #include "hal/clock.hpp"
 #include "journal/file_hash.hpp"
 #include "journal/journal_format.hpp"
@@ -142,10 +145,20 @@ void ExecutionJournal::write(const ExecutionEntry& entry) {
     writer_->message(entries_, entry_count_++, unix_ns(monotonic_ns()), to_json(entry));
 }
 
-void ExecutionJournal::edited(std::uint64_t epoch, std::vector<std::vector<std::string>> commands,
-                              const Model& model) {
-    ExecutionEntry entry{.kind = ExecutionEntry::Kind::edit, .epoch = epoch};
-    entry.commands = std::move(commands);
+namespace {
+
+ExecutionEntry entry_of(ExecutionEntry::Kind kind, JournaledTransaction transaction) {
+    ExecutionEntry entry{.kind = kind, .epoch = transaction.epoch};
+    entry.commands = std::move(transaction.commands);
+    entry.starts = transaction.starts;
+    entry.calls = std::move(transaction.calls);
+    return entry;
+}
+
+}  // namespace
+
+void ExecutionJournal::edited(JournaledTransaction transaction, const Model& model) {
+    ExecutionEntry entry = entry_of(ExecutionEntry::Kind::edit, std::move(transaction));
     const auto loads = [](const std::vector<std::string>& words) {
         const std::string& name = words.front();
         return name == "loadrt" || name == "reload" || name == "newinst" || name == "loadusr";
@@ -162,17 +175,12 @@ void ExecutionJournal::edited(std::uint64_t epoch, std::vector<std::vector<std::
     add(std::move(entry));
 }
 
-void ExecutionJournal::withdrawn(std::uint64_t epoch,
-                                 std::vector<std::vector<std::string>> commands) {
-    ExecutionEntry entry{.kind = ExecutionEntry::Kind::withdrawn, .epoch = epoch};
-    entry.commands = std::move(commands);
-    add(std::move(entry));
+void ExecutionJournal::withdrawn(JournaledTransaction transaction) {
+    add(entry_of(ExecutionEntry::Kind::withdrawn, std::move(transaction)));
 }
 
-void ExecutionJournal::skipped(std::vector<std::uint64_t> calls) {
-    ExecutionEntry entry{.kind = ExecutionEntry::Kind::skipped};
-    entry.calls = std::move(calls);
-    add(std::move(entry));
+void ExecutionJournal::rejected(JournaledTransaction transaction) {
+    add(entry_of(ExecutionEntry::Kind::rejected, std::move(transaction)));
 }
 
 void ExecutionJournal::written(std::vector<std::pair<std::string, std::uint64_t>> values) {
@@ -247,6 +255,9 @@ void ExecutionJournal::attach(const std::string& name, const std::string& text) 
 }
 
 void ExecutionJournal::work() {
+    // other programs must not make it late, so that a buffer overflows; where that is not allowed,
+    // it goes on without
+    ::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), -10);
     std::unique_lock own(mutex_);
     while (!ends_) {
         wake_.wait_for(own, drain_every);

@@ -44,10 +44,9 @@ public:
     // ExecutionSink
     CycleInputs* thread_made(const std::string& name, std::int64_t period_ns,
                              std::uint32_t id) override;
-    void edited(std::uint64_t epoch, std::vector<std::vector<std::string>> commands,
-                const Model& model) override;
-    void withdrawn(std::uint64_t epoch, std::vector<std::vector<std::string>> commands) override;
-    void skipped(std::vector<std::uint64_t> calls) override;
+    void edited(JournaledTransaction transaction, const Model& model) override;
+    void withdrawn(JournaledTransaction transaction) override;
+    void rejected(JournaledTransaction transaction) override;
     void written(std::vector<std::pair<std::string, std::uint64_t>> values) override;
     void switched(bool running) override;
     void halted() noexcept override { is_halt_unnoted_ = true; }

@@ -10,11 +10,11 @@ using Json = nlohmann::json;
 using Kind = ExecutionEntry::Kind;
 
 constexpr std::pair<Kind, const char*> kinds[] = {
-    {Kind::edit, "edit"},       {Kind::withdrawn, "withdrawn"},
-    {Kind::written, "written"}, {Kind::start, "start"},
-    {Kind::stop, "stop"},       {Kind::opened, "opened"},
-    {Kind::sampled, "sampled"}, {Kind::end, "end"},
-    {Kind::skipped, "skipped"},
+    {Kind::edit, "edit"},         {Kind::withdrawn, "withdrawn"},
+    {Kind::written, "written"},   {Kind::start, "start"},
+    {Kind::stop, "stop"},         {Kind::opened, "opened"},
+    {Kind::sampled, "sampled"},   {Kind::end, "end"},
+    {Kind::rejected, "rejected"},
 };
 
 const char* name_of(Kind kind) {
@@ -45,6 +45,7 @@ std::string to_json(const ExecutionEntry& entry) {
                 {{"component", file.component}, {"path", file.path}, {"hash", file.hash}});
         }
         json["files"] = std::move(files);
+        json["calls"] = entry.calls;
         break;
     }
     case Kind::written: json["values"] = entry.values; break;
@@ -58,10 +59,16 @@ std::string to_json(const ExecutionEntry& entry) {
         json["streams"] = entry.streams;
         break;
     case Kind::sampled: json["names"] = entry.names; break;
-    case Kind::skipped: json["calls"] = entry.calls; break;
+    case Kind::rejected:
+        json["epoch"] = entry.epoch;
+        json["commands"] = entry.commands;
+        json["starts"] = entry.starts;
+        json["calls"] = entry.calls;
+        break;
     case Kind::withdrawn:
         json["epoch"] = entry.epoch;
         json["commands"] = entry.commands;
+        json["calls"] = entry.calls;
         break;
     case Kind::start:
     case Kind::stop:
@@ -85,6 +92,7 @@ std::optional<ExecutionEntry> execution_entry(std::string_view text) {
                                        file.at("path").get<std::string>(),
                                        file.at("hash").get<std::string>()});
             }
+            entry.calls = json.value("calls", entry.calls);  // none in earlier versions
             break;
         case Kind::written: json.at("values").get_to(entry.values); break;
         case Kind::opened:
@@ -97,10 +105,16 @@ std::optional<ExecutionEntry> execution_entry(std::string_view text) {
             json.at("streams").get_to(entry.streams);
             break;
         case Kind::sampled: json.at("names").get_to(entry.names); break;
-        case Kind::skipped: json.at("calls").get_to(entry.calls); break;
+        case Kind::rejected:
+            json.at("epoch").get_to(entry.epoch);
+            json.at("commands").get_to(entry.commands);
+            json.at("starts").get_to(entry.starts);
+            json.at("calls").get_to(entry.calls);
+            break;
         case Kind::withdrawn:  // without members in earlier versions
             entry.epoch = json.value("epoch", entry.epoch);
             entry.commands = json.value("commands", entry.commands);
+            entry.calls = json.value("calls", entry.calls);
             break;
         case Kind::start:
         case Kind::stop:

@@ -21,9 +21,13 @@ struct JournaledFile {
 /// One entry; which members are used depends on the kind.
 struct ExecutionEntry {
     enum class Kind {
-        edit,       ///< a transaction took effect: epoch, commands, files
-        withdrawn,  ///< a transaction was rolled back after threads had taken it: epoch, commands
-        skipped,  ///< a transaction was rejected that had used buses in memory: calls
+        /// a transaction took effect: epoch, commands, calls, files
+        edit,
+        /// a transaction was rolled back after threads had taken it: epoch, commands, calls
+        withdrawn,
+        /// a transaction was rejected or rolled back that had used buses in memory: epoch,
+        /// commands, calls, starts
+        rejected,
         written,  ///< programs wrote pins: values
         start,  ///< functions were started
         stop,
@@ -46,7 +50,8 @@ struct ExecutionEntry {
     std::uint64_t links = 0;
     std::uint64_t streams = 0;
     std::vector<std::string> names = {};
-    std::vector<std::uint64_t> calls = {};
+    bool starts = false;  ///< its instances had been started
+    std::vector<std::uint64_t> calls = {};  ///< tickets of its calls on buses in memory
 };
 
 /// Returns an entry as a line of JSON. [setup]

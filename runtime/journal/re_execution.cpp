@@ -63,10 +63,11 @@ ReExecution::ReExecution(JournalFile& file) : file_(file) {
         }
     }
     now_ns_ = begin_ns_.value_or(0);
-    for (const ExecutionEntry& entry : file.entries()) {
-        skipped_calls_.insert(entry.calls.begin(), entry.calls.end());
+    for (std::size_t i = 0; i < file.entries().size(); ++i) {
+        for (const std::uint64_t call : file.entries()[i].calls) {
+            session_calls_[call] = i;
+        }
     }
-    pass_skipped_calls();
     if (!file.begin()) return;
     if (const std::string problem = component_heap::track(); !problem.empty()) {
         fail(State::fails, "the state that the journal begins with cannot be restored: " + problem);
@@ -148,16 +149,27 @@ ReExecution::Cursor* ReExecution::next(bool& needs_edit, bool in_edit) {
         if (!in_edit) return nullptr;
     }
     // the call before it may be one of the session, in start() or stop() of the next edit
-    needs_edit = needs_edit || (waits_in_call && entry_ < file_.entries().size());
+    if (waits_in_call && waits_for_session()) {
+        needs_edit = true;
+        if (!in_edit) return nullptr;
+    }
     return accepts_differences_ ? stalled_call() : nullptr;
 }
 
+/// Returns whether the next call on a bus is one of an edit that is still to be made.
+bool ReExecution::waits_for_session() const {
+    if (entry_ >= file_.entries().size()) return false;
+    const auto found = session_calls_.find(next_call_);
+    if (found != session_calls_.end()) return found->second >= entry_;
+    return !accepts_differences_;  // a journal of an earlier version does not have them
+}
+
 /// A changed machine may make fewer calls than the journaled one. Returns the thread whose call is
-/// the next one that is made; nullptr: none waits.
+/// the next one that is made, before that of the session; nullptr: none waits.
 ReExecution::Cursor* ReExecution::stalled_call() {
     Cursor* first = nullptr;
     for (auto& [number, cursor] : cursors_) {
-        const bool waits = cursor.suspended && cursor.in_call;
+        const bool waits = cursor.suspended && cursor.in_call && cursor.ticket < setup_call_;
         if (waits && (!first || cursor.ticket < first->ticket)) {
             first = &cursor;
         }
@@ -272,8 +284,10 @@ void ReExecution::pass_skipped_calls() {
 
 /// Called by a setup call, on the session's stack.
 void ReExecution::wait_for_setup_call(std::uint64_t ticket) {
+    setup_call_ = ticket;
     while (ticket > next_call_ && step()) {
     }
+    setup_call_ = UINT64_MAX;
     pass_call(ticket);
 }
 
@@ -518,7 +532,8 @@ bool ReExecution::make_next_edit() {
     const auto waits_for_nothing = [](const ExecutionEntry& entry) {
         return entry.kind != ExecutionEntry::Kind::edit &&
                entry.kind != ExecutionEntry::Kind::written &&
-               entry.kind != ExecutionEntry::Kind::withdrawn;
+               entry.kind != ExecutionEntry::Kind::withdrawn &&
+               entry.kind != ExecutionEntry::Kind::rejected;
     };
     while (entry_ < entries.size() && waits_for_nothing(entries[entry_])) {
         make(entries[entry_++]);
@@ -531,6 +546,7 @@ bool ReExecution::make(const ExecutionEntry& entry) {
     case ExecutionEntry::Kind::edit: return make_edit(entry);
     case ExecutionEntry::Kind::written: return write(entry);
     case ExecutionEntry::Kind::withdrawn: return make_withdrawn(entry);
+    case ExecutionEntry::Kind::rejected: return make_rejected(entry);
     case ExecutionEntry::Kind::sampled:
         if (!entry.names.empty()) {
             sampled_(entry.names);
@@ -539,7 +555,6 @@ bool ReExecution::make(const ExecutionEntry& entry) {
     case ExecutionEntry::Kind::opened:
         outside_ = outside_ || !entry.resources.empty() || entry.threads > 0;
         return true;
-    case ExecutionEntry::Kind::skipped:
     case ExecutionEntry::Kind::start:
     case ExecutionEntry::Kind::stop:
     case ExecutionEntry::Kind::end: return true;  // the cycles have it
@@ -552,13 +567,35 @@ bool ReExecution::make(const ExecutionEntry& entry) {
 std::optional<bool> ReExecution::commit(const ExecutionEntry& entry, Diagnostics& diagnostics) {
     session_->threads().continue_after(entry.epoch);
     Transaction transaction = session_->begin();
+    if (!make_commands(transaction, entry, diagnostics)) return std::nullopt;
+    return transaction.commit(diagnostics);
+}
+
+bool ReExecution::make_commands(Transaction& transaction, const ExecutionEntry& entry,
+                                Diagnostics& diagnostics) {
     for (const auto& words : entry.commands) {
         if (words.empty() || !make_command(transaction, words, diagnostics)) {
-            fail(State::fails, "invalid entry of the journal: " + text_of(entry.commands));
-            return std::nullopt;
+            return fail(State::fails, "invalid entry of the journal: " + text_of(entry.commands));
         }
     }
-    return transaction.commit(diagnostics);
+    return true;
+}
+
+/// Its instances were on a bus in memory until it was rejected. What rejected it may be outside of
+/// the process, so it is rejected here in any case.
+bool ReExecution::make_rejected(const ExecutionEntry& entry) {
+    session_->threads().continue_after(entry.epoch);
+    Diagnostics ignored;
+    Transaction transaction = session_->begin();
+    if (!make_commands(transaction, entry, ignored)) return false;
+    if (entry.starts) {
+        transaction.start_and_reject(ignored);
+    } else {
+        transaction.roll_back();
+    }
+    skipped_calls_.insert(entry.calls.begin(), entry.calls.end());  // those that it did not make
+    pass_skipped_calls();
+    return state_ == State::goes_on;
 }
 
 /// A thread that did not take the plan live has no cycle with it, so that the edit is rolled back

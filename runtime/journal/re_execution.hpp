@@ -132,6 +132,7 @@ private:
     /// A thread that exists has no further record in a journal without an end.
     bool breaks_off() const;
     Cursor* next(bool& needs_edit, bool in_edit);
+    bool waits_for_session() const;
     Cursor* stalled_call();
     bool execute(Cursor& cursor);
     void finish_cycle(Cursor& cursor);
@@ -150,6 +151,9 @@ private:
     bool make(const ExecutionEntry& entry);
     bool make_edit(const ExecutionEntry& entry);
     bool make_withdrawn(const ExecutionEntry& entry);
+    bool make_rejected(const ExecutionEntry& entry);
+    bool make_commands(Transaction& transaction, const ExecutionEntry& entry,
+                       Diagnostics& diagnostics);
     std::optional<bool> commit(const ExecutionEntry& entry, Diagnostics& diagnostics);
     bool make_command(Transaction& transaction, const std::vector<std::string>& words,
                       Diagnostics& diagnostics);
@@ -165,7 +169,9 @@ private:
     Cursor* running_ = nullptr;
     std::uint64_t next_ticket_ = 0;
     std::uint64_t next_call_ = 0;  // ticket
-    std::set<std::uint64_t> skipped_calls_;  // tickets that no call of the re-execution has
+    std::uint64_t setup_call_ = UINT64_MAX;  // ticket for which a call of the session waits
+    std::map<std::uint64_t, std::size_t> session_calls_;  // ticket, entry that makes the call
+    std::set<std::uint64_t> skipped_calls_;  // tickets of rejected edits that are not still to come
     std::uint64_t overlaps_ = 0;
     JournaledCycle first_overlap_;
     std::size_t entry_ = 0;  // the next one

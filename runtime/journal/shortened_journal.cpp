@@ -50,6 +50,7 @@ void add_first(JournalCopy& copy, JournalFile& file, JournaledThread& thread, st
 /// Whether a machine without cycles needs it: values are in the state.
 bool makes_machine(const ExecutionEntry& entry) {
     if (entry.kind == ExecutionEntry::Kind::opened) return true;
+    if (entry.kind == ExecutionEntry::Kind::rejected) return true;  // its memory was allocated, too
     if (entry.kind != ExecutionEntry::Kind::edit) return false;
     return std::ranges::any_of(entry.commands, [](const std::vector<std::string>& words) {
         return words.empty() || (words.front() != "setp" && words.front() != "sets");

@@ -64,6 +64,13 @@ addf d.update servo
 start
 """
 
+# The only node of its bus: nothing acknowledges its frames.
+LONELY = """loadrt threads name1=servo period1=1000000
+loadrt can_traffic names=a link=sim:lonely id=0x200 messages=20 one_node=1
+addf a.update servo
+start
+"""
+
 DRIVE = """loadrt threads name1=servo period1=1000000
 loadrt canopen_drive link={bus} id=2
 addf canopen-drive.0.update servo
@@ -184,19 +191,38 @@ unloadrt can_faults
         self.assertRegex(text, r"\nno difference, \d{4,} values compared\n$")
         self.assertRegex(text, r"^\d+ cycles of 1 thread, \d{3} edits")
 
-    def test_an_edit_that_uses_a_bus_in_memory_and_is_rejected(self):
-        # two nodes acknowledge each other's frames, so that a third one changes nothing
-        netlist = self.write("a.hal", BUSY_BUS.replace(" one_node=1", ""))
-        machine = self.start("run", netlist, "--journal", "run.mcap", "--values", "*")
+    def reject_edits(self):
+        """Runs a machine whose bus gets further nodes with edits that are rejected or rolled back."""
+        # nobody acknowledges the frames of the only node, until there is another one
+        machine = self.start(
+            "run", self.write("a.hal", LONELY), "--journal", "run.mcap", "--values", "*"
+        )
         self.wait_for_cycles("servo", 100)
-        # the second instance does not start, so the first one is removed from the bus again
-        edit = "loadrt can_faults link=sim:busy victim=0\nloadrt can_send link=can:none-such id=5\n"
-        for _ in range(5):
-            done = self.run_program("shell", given=f"begin\n{edit}commit\n")
-            self.assertIn("none-such", done.stderr)
+        others = "loadrt can_traffic names=b link=sim:lonely id=0x100\n"
+        for end in ("loadrt can_send link=can:none-such id=5\ncommit", "nonsense\ncommit", "abort"):
+            for _ in range(3):
+                done = self.run_program("shell", given=f"begin\n{others}{end}\n")
+                self.assertEqual("abort" not in end, done.returncode != 0, done.stderr)
+                self.wait_for_cycles("servo", 20)
+        self.assertGreater(int(self.shell("getp", "a.sent").stdout), 0)
         self.wait_for_cycles("servo", 100)
         self.finish(machine)
+
+    def test_edits_that_use_a_bus_in_memory_and_are_rejected(self):
+        self.reject_edits()
         self.assertRegex(self.replay(), r"\nno difference, \d{4,} values compared\n$")
+
+    def test_a_test_and_a_state_behind_rejected_edits(self):
+        self.reject_edits()
+        for part in range(1, 10):
+            at = ["--until", f"{part * 0.05:.2f}s"]
+            self.good(
+                "replay", "--exact", "run.mcap", *at, "--show", "a.sent", "--as-test", f"t{part}"
+            )
+            self.assertIn("1 value, 0 not as expected\n", self.good("replay", f"t{part}"))
+            self.assertEqual(0, self.run_program("check", f"t{part}/test.hal").returncode)
+            self.good("replay", "--exact", "run.mcap", *at, "--cut", f"rest{part}.mcap")
+            self.assertIn("\nno difference\n", self.good("replay", "--exact", f"rest{part}.mcap"))
 
     @unittest.skipIf(SANITIZED, "a sanitizer has the functions of the clock and of files")
     def test_a_master_whose_node_is_killed(self):
@@ -244,6 +270,48 @@ unloadrt can_faults
             self.replay(status=1),
             r"first difference: cycle \d+ of thread 'servo' at \S+ s sends other frames on udp:",
         )
+
+    def run_spindle(self, link, nodes=""):
+        """Runs a spindle that starts, loses its line and stops."""
+        folder = ROOT / "halfiles" / "modbus-spindle"
+        settings = (folder / "spindle.modbus").read_text()
+        self.write("spindle.modbus", settings.replace("sim:spindle", link))
+        netlist = (folder / "spindle.hal").read_text()
+        for line in ("loadrt modbus_node config=spindle.modbus\n", "addf modbus-node.0 servo\n"):
+            netlist = netlist.replace(line, line if not nodes else "")
+        machine = self.start(
+            "run", self.write("a.hal", netlist), "--journal", "run.mcap", "--values", "*"
+        )
+        self.wait_for("modbus.0.online", "TRUE")
+        wait_until(lambda: self.value("modbus.0.spindle.age") != "inf", "the speed is read")
+        self.good("shell", given="sets speed-wish 9000\nsets start-button TRUE\n")
+        self.wait_for("modbus.0.spindle.at-speed", "TRUE")
+        self.wait_for("modbus.0.coolant.pump", "TRUE")
+        self.lose_line(nodes)
+        self.wait_for("modbus.0.online", "FALSE")
+        self.wait_for_cycles("servo", 100)
+        self.finish(machine)
+
+    def lose_line(self, nodes):
+        if nodes:
+            nodes.kill()
+            nodes.wait()
+        else:
+            self.good("shell", given="setp modbus-node.0.silence TRUE\n")
+
+    @needs_package("modbus")
+    def test_a_line_of_modbus_in_memory(self):
+        self.run_spindle("sim:spindle")
+        self.assertRegex(self.replay(), r"\nno difference, \d{5,} values compared\n$")
+
+    @needs_package("modbus")
+    def test_a_guarded_line_of_modbus_is_not_opened_again(self):
+        settings = ROOT / "halfiles" / "modbus-spindle" / "spindle.modbus"
+        port = self.folder / "port"
+        nodes = self.start("node", "modbus", settings, "--link", f"pty:{port}", loaded=False)
+        wait_until(port.exists, "the port of the nodes")
+        self.run_spindle(f"serial:{port}", nodes)
+        self.assertRegex(self.replay(), r"\nno difference, \d{5,} values compared\n$")
 
     @needs_package("tdma")
     @unittest.skipIf(os.geteuid() != 0, "needs network namespaces: run it as root")

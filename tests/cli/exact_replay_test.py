@@ -15,7 +15,7 @@ import subprocess
 import sys
 import unittest
 
-from harness import HAL, PLUGINS, SANITIZED, SERVO, TIMEOUT, Case, wait_until
+from harness import HAL, PLUGINS, ROOT, SANITIZED, SERVO, TIMEOUT, Case, wait_until
 
 # Three threads that read each other: jitter and missed periods decide which cycles they read. The
 # execution time of a thread is a value like any other.
@@ -664,6 +664,9 @@ start
         self.assertRegex(
             self.good("replay", "case"), r"^\d+ cycles: 2 values, 0 not as expected\n$"
         )
+        run = [sys.executable, ROOT / "tests/netlists/run.py", HAL, "--once", case]
+        done = subprocess.run(run, capture_output=True, text=True, env=self.environment)
+        self.assertEqual("1 of 1 netlist tests passed\n", done.stdout + done.stderr)
         # a changed plugin is what the test is for
         with open(own / "sum2.so", "ab") as plugin:
             plugin.write(b"x")
@@ -676,6 +679,9 @@ start
             r"^effort \S+ instead of 7\nwheel unknown instead of 3\n"
             r"\d+ cycles: 2 values, 2 not as expected\n$",
         )
+        done = subprocess.run(run, capture_output=True, text=True, env=self.environment)
+        self.assertIn("\n    wheel unknown instead of 3\n", done.stdout)
+        self.assertIn("\n0 of 1 netlist tests passed\n", done.stdout)
         (case / "expected").write_text("\n")
         done = self.run_program("replay", "case")
         self.assertEqual(1, done.returncode)
@@ -874,6 +880,28 @@ start
             r"first difference: cycle \d+ of thread 'servo' at \S+ s has values with another "
             r"checksum\nto have the value named, write the journal with: --values '\*'",
         )
+
+    def test_what_a_helper_thread_computes_is_recorded_by_its_component(self):
+        machine = self.run_journaled(
+            """loadrt threads name1=servo period1=1000000
+loadrt siggen names=wave
+loadrt lqr names=hold a=0,1;0,0 b=0;0.5 q="diag 1000 10" r=0.01
+addf wave.update servo
+addf hold.update servo
+net place wave.sine => hold.x-0
+""",
+            "--values",
+            "*",
+        )
+        for number in range(1, 6):
+            self.give([f"setp hold.q-0 {number * 100}"])
+            self.comes("hold.designs", str(number))
+        self.give(["setp hold.q-0 -1"])
+        self.comes("hold.rejected", "TRUE")
+        self.finish(machine)
+        done = self.run_program("replay", "--exact", "run.mcap", "--show", "hold.designs")
+        self.assertEqual((0, ""), (done.returncode, done.stderr))
+        self.assertRegex(done.stdout, r"no difference, \d{4,} values compared\nhold.designs 5\n")
 
     @unittest.skipIf(SANITIZED, "a sanitizer has the functions of the clock")
     def test_a_component_gets_the_time_that_it_has_read(self):

@@ -26,9 +26,9 @@ struct Results final : ExecutionSink, CycleSchedule {
     CycleInputs* thread_made(const std::string&, std::int64_t, std::uint32_t) override {
         return nullptr;
     }
-    void edited(std::uint64_t, std::vector<std::vector<std::string>>, const Model&) override {}
-    void withdrawn(std::uint64_t, std::vector<std::vector<std::string>>) override {}
-    void skipped(std::vector<std::uint64_t>) override {}
+    void edited(JournaledTransaction, const Model&) override {}
+    void withdrawn(JournaledTransaction) override {}
+    void rejected(JournaledTransaction) override {}
     void written(std::vector<std::pair<std::string, std::uint64_t>>) override {}
     void switched(bool) override {}
     void halted() noexcept override {}
@@ -60,7 +60,7 @@ TEST(SetupJournal, Gives_back_readings_of_clocks_of_calls_that_took_effect) {
             journal.reading(18);
             journal.hide_readings(false);
         }
-        journal.reject(nullptr);  // the transaction was rejected
+        journal.forget();  // the transaction was rejected
         {
             const SetupCall call("x", "test", "start");
             times.push_back(journal.reading(19));

@@ -39,6 +39,7 @@ std::string netlist(const JournalFile& file, std::size_t entries) {
         "# The machine of journal.mcap, with what was typed while it ran. Run the test with: hal "
         "replay FOLDER\n";
     for (std::size_t i = 0; i < std::min(entries, file.entries().size()); ++i) {
+        if (file.entries()[i].kind != ExecutionEntry::Kind::edit) continue;
         for (const auto& words : file.entries()[i].commands) {
             if (words.empty() || words.front().starts_with(':')) continue;  // pins of a program
             std::string line;

@@ -91,6 +91,7 @@ private:
 std::string text_of(const JournalFile& file, std::size_t entries) {
     std::string text;
     for (std::size_t i = 0; i < std::min(entries, file.entries().size()); ++i) {
+        if (file.entries()[i].kind != ExecutionEntry::Kind::edit) continue;
         for (const auto& words : file.entries()[i].commands) {
             const bool has_line = !words.empty() && !words.front().starts_with(':');
             text += has_line ? line_of(words) : "";

@@ -38,6 +38,13 @@ struct OutsideWorld {
     }
 };
 
+struct JournaledTransaction {
+    std::uint64_t epoch = 0;  ///< of the last plan before it
+    std::vector<std::vector<std::string>> commands = {};  ///< the words of each, substituted
+    bool starts = false;  ///< its new instances were started
+    std::vector<std::uint64_t> calls = {};  ///< tickets of its ordered calls on buses in memory
+};
+
 /// [setup], with the session's lock held. Given in SessionOptions; outlives the session.
 class ExecutionSink {
 public:
@@ -46,16 +53,13 @@ public:
     /// it.
     virtual CycleInputs* thread_made(const std::string& name, std::int64_t period_ns,
                                      std::uint32_t id) = 0;
-    /// A transaction has taken effect. `epoch`: of the last plan before it. `commands`: the words
-    /// of each command, substituted.
-    virtual void edited(std::uint64_t epoch, std::vector<std::vector<std::string>> commands,
-                        const Model& model) = 0;
+    /// A transaction has taken effect.
+    virtual void edited(JournaledTransaction transaction, const Model& model) = 0;
     /// A transaction was rolled back after threads had taken it, and they have the plans of the
-    /// model before it again. `epoch` and `commands`: as of edited(); none when a thread may still
-    /// use what the transaction has made.
-    virtual void withdrawn(std::uint64_t epoch, std::vector<std::vector<std::string>> commands) = 0;
-    /// These ordered calls on buses in memory were made by a transaction that was rejected: tickets.
-    virtual void skipped(std::vector<std::uint64_t> calls) = 0;
+    /// model before it again. It has no commands when a thread may still use what it has made.
+    virtual void withdrawn(JournaledTransaction transaction) = 0;
+    /// A transaction was rejected or rolled back, and no thread had taken it; it has calls.
+    virtual void rejected(JournaledTransaction transaction) = 0;
     /// Programs have written these pins: names and values.
     virtual void written(std::vector<std::pair<std::string, std::uint64_t>> values) = 0;
     /// The functions were started or stopped.

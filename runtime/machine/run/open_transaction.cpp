@@ -54,6 +54,8 @@ void destroy(const std::vector<std::unique_ptr<Instance>>& instances, Executor& 
 void OpenTransaction::begin() {
     if (open_) throw std::logic_error("a transaction is open already");
     open_ = true;
+    starts_ = false;
+    is_rejected_ = false;
     commands_ = 0;
     words_.clear();
 }
@@ -126,12 +128,25 @@ bool OpenTransaction::commit(Diagnostics& diagnostics) {
     return good;
 }
 
+void OpenTransaction::start_and_reject(Diagnostics& diagnostics) {
+    is_rejected_ = true;
+    commit(diagnostics);
+}
+
 /// `epoch`: of the last plan before the edit.
+JournaledTransaction OpenTransaction::journaled(std::uint64_t epoch) {
+    return {.epoch = epoch,
+            .commands = std::exchange(words_, {}),
+            .starts = starts_,
+            .calls = state_.setup->ordered_calls()};
+}
+
 void OpenTransaction::journal(std::uint64_t epoch) noexcept {
     if (!state_.options.sink) return;
     try {
+        JournaledTransaction noted = journaled(epoch);
         state_.setup->flush(*state_.options.sink);
-        state_.options.sink->edited(epoch, std::exchange(words_, {}), state_.model);
+        state_.options.sink->edited(std::move(noted), state_.model);
     } catch (const std::bad_alloc&) {
         // The edit has taken effect. The re-execution ends where the first cycle needs it.
     }
@@ -139,7 +154,7 @@ void OpenTransaction::journal(std::uint64_t epoch) noexcept {
 
 bool OpenTransaction::carry_out(Diagnostics& diagnostics) {
     const std::size_t values = edit_->pin_values.size() + edit_->signal_values.size();
-    if (!edit_->structural() && values <= Core::max_writes / 2) {
+    if (!edit_->structural() && values <= Core::max_writes / 2 && !is_rejected_) {
         if (!state_.threads.write(edit_->pin_values, edit_->signal_values, diagnostics)) {
             return false;
         }
@@ -168,7 +183,8 @@ bool OpenTransaction::carry_out(Diagnostics& diagnostics) {
 bool OpenTransaction::carry_out_checked(Diagnostics& diagnostics) {
     ThreadPlans& threads = state_.threads;
     if (!threads.all_answer(diagnostics)) return false;
-    if (!start_added(diagnostics)) return false;
+    starts_ = true;
+    if (!start_added(diagnostics) || is_rejected_) return false;
     touched_ = true;
     edit_->make_taken_safe();
     if (!ReplacedInstances(state_, *edit_, before_).start(diagnostics)) return false;
@@ -213,7 +229,21 @@ void OpenTransaction::withdraw(Diagnostics* diagnostics, std::uint64_t epoch) {
     if (is_taken) {
         journal_withdrawal(epoch, is_undone);
     } else if (state_.setup) {
-        state_.setup->reject(state_.options.sink);
+        journal_rejection(epoch);
+        state_.setup->forget();
+    }
+}
+
+/// A bus in memory has seen the instances: the same edit is made, and rejected, again.
+void OpenTransaction::journal_rejection(std::uint64_t epoch) noexcept {
+    if (!state_.options.sink) return;
+    try {
+        JournaledTransaction noted = journaled(epoch);
+        if (noted.calls.empty()) return;
+        state_.setup->flush(*state_.options.sink);
+        state_.options.sink->rejected(std::move(noted));
+    } catch (const std::bad_alloc&) {
+        // The re-execution ends where the first call behind it waits for one of its calls.
     }
 }
 
@@ -221,9 +251,12 @@ void OpenTransaction::withdraw(Diagnostics* diagnostics, std::uint64_t epoch) {
 void OpenTransaction::journal_withdrawal(std::uint64_t epoch, bool is_undone) noexcept {
     if (!state_.options.sink) return;
     try {
+        JournaledTransaction noted = journaled(epoch);
+        if (!is_undone) {
+            noted.commands.clear();
+        }
         state_.setup->flush(*state_.options.sink);
-        state_.options.sink->withdrawn(
-            epoch, is_undone ? std::exchange(words_, {}) : std::vector<std::vector<std::string>>());
+        state_.options.sink->withdrawn(std::move(noted));
     } catch (const std::bad_alloc&) {
         // The re-execution ends where the first cycle needs it.
     }

@@ -13,6 +13,7 @@
 
 #include "machine/load/elaborate.hpp"
 #include "machine/run/commit_checks.hpp"
+#include "machine/run/execution_sink.hpp"
 #include "machine/run/thread_plans.hpp"
 #include "model/edit.hpp"
 #include "text/diagnostic.hpp"
@@ -44,6 +45,8 @@ public:
 
     /// Ends the transaction: makes it take effect, or rolls it back. False after reporting.
     bool commit(Diagnostics& diagnostics);
+    /// Ends the transaction as a commit() that is rejected when its instances have been started.
+    void start_and_reject(Diagnostics& diagnostics);
     /// Ends the transaction and undoes it.
     void roll_back();
     /// Undoes what the open transaction has edited; its end does nothing more.
@@ -53,18 +56,22 @@ public:
     void out_of_memory(Diagnostics& diagnostics);
 
 private:
+    JournaledTransaction journaled(std::uint64_t epoch);
     void journal(std::uint64_t epoch) noexcept;
     bool carry_out(Diagnostics& diagnostics);
     bool carry_out_checked(Diagnostics& diagnostics);
     bool start_added(Diagnostics& diagnostics);
     void withdraw(Diagnostics* diagnostics, std::uint64_t epoch);
     void journal_withdrawal(std::uint64_t epoch, bool is_undone) noexcept;
+    void journal_rejection(std::uint64_t epoch) noexcept;
     bool restore_threads(Diagnostics& diagnostics);
     void close_edit();
     void forget_edit();
 
     SessionState& state_;
     bool open_ = false;
+    bool starts_ = false;  // its instances have been started
+    bool is_rejected_ = false;  // by start_and_reject()
     std::unique_ptr<Edit> edit_;
     std::vector<std::function<void()>> actions_;
     bool needs_threads_ = false;

@@ -112,13 +112,6 @@ void SetupJournal::flush(ExecutionSink& sink) {
     forget();
 }
 
-void SetupJournal::reject(ExecutionSink* sink) {
-    if (sink && !ordered_.empty()) {
-        sink->skipped(std::exchange(ordered_, {}));
-    }
-    forget();
-}
-
 void SetupJournal::forget() {
     ordered_.clear();
     calls_.clear();

@@ -47,15 +47,16 @@ public:
 
     /// The transaction has taken effect: what its calls got goes to the sink.
     void flush(ExecutionSink& sink);
-    /// The transaction was rejected: nothing of it is written but which ordered calls it has made.
-    void reject(ExecutionSink* sink);
+    /// Returns the tickets of the ordered calls that the transaction has made.
+    const std::vector<std::uint64_t>& ordered_calls() const { return ordered_; }
+    /// The transaction was rejected, and has left nothing.
+    void forget();
 
     // SetupReader
     std::int64_t reading(std::int64_t value) override;
     int opened(const char* path, int (*open_now)(const char*, int), int flags) override;
 
 private:
-    void forget();
     int record_file(const char* path, int descriptor);
     static int descriptor_of(const SetupFile& file);
 

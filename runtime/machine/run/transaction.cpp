@@ -85,4 +85,9 @@ bool Transaction::commit(Diagnostics& diagnostics) {
     return std::exchange(machine_, nullptr)->state_->transaction.commit(diagnostics);
 }
 
+void Transaction::start_and_reject(Diagnostics& diagnostics) {
+    if (!machine_) throw std::logic_error("the transaction has ended already");
+    std::exchange(machine_, nullptr)->state_->transaction.start_and_reject(diagnostics);
+}
+
 }  // namespace hal

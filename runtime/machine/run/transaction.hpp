@@ -45,6 +45,8 @@ public:
     /// reports and rolls back everything. With any error already in `diagnostics` it rolls back.
     /// Throws std::logic_error when the transaction has ended before.
     bool commit(Diagnostics& diagnostics);
+    /// Ends the transaction as a commit() that is rejected when its instances have been started.
+    void start_and_reject(Diagnostics& diagnostics);
     /// Ends the transaction and undoes everything. Does nothing when it has ended before.
     void roll_back();
 
