@@ -29,7 +29,7 @@ from program import ROOT, environment, program
 HALFILES = ROOT / "halfiles"
 WRITABLE = re.compile(r"(?m)^\s*\S+\s+(bit|float|s32|u32)\s+IN\s+\S+\s+(\S+)$")
 BUSY = "while True: pass"
-STARVED = "[starved-thread]"  # of an error that rejects the netlist
+STARVED = re.compile(r"\[(starved|silent)-thread\]")  # of an error that rejects the netlist
 # Components with inputs and outputs of type float.
 PARTS = {
     "sum2": (["in0", "in1"], ["out"]),
@@ -255,8 +255,9 @@ def verdict(name, machine, error):
     status, out, err = machine.replay()
     same = re.search(r"(?m)^no difference(, (\d+) values? compared)?$", out)
     executed = re.match(r"(\d+ cycles).*?, (\d+ edits?)", out)
-    if executed and executed[1] == "0 cycles":
-        print(f"{name}: does not run by itself: no cycle")
+    if status == 0 and executed and executed[1] == "0 cycles":
+        lines = [line for line in error.splitlines() if "journal" not in line]
+        print(f"{name}: does not run by itself: no cycle; {lines[:1]}", flush=True)
         return None
     count = f"{executed[1]}, {executed[2]}" if executed else "nothing"
     if executed:
@@ -312,7 +313,7 @@ def attempt(hal, name, prepare, options):
                 machine.disturb(options, dice)
             finally:
                 error = machine.stop()
-        if STARVED in error:
+        if STARVED.search(error):
             print(f"{name}: a thread had no CPU time at the start", flush=True)
             return machine, None, True
         if why:

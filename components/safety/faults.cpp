@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
 #include "hal/edge.hpp"
+#include "hal/journal.hpp"
 #include "hal/retained.hpp"
 #include "hal/supervision.h"
 
@@ -36,12 +37,13 @@ struct Faults : hal::Component {
 
     void update(hal::Cycle) noexcept {
         if (record_ == nullptr) return;
-        count = __atomic_load_n(&record_->count, __ATOMIC_ACQUIRE);
+        // other threads raise faults at any moment
+        count = seen_count_(__atomic_load_n(&record_->count, __ATOMIC_ACQUIRE));
         acknowledge();
-        active = count != __atomic_load_n(&record_->cleared, __ATOMIC_ACQUIRE);
+        active = count != seen_cleared_(__atomic_load_n(&record_->cleared, __ATOMIC_ACQUIRE));
         ok = !active;
-        last_code = __atomic_load_n(&record_->last_code, __ATOMIC_RELAXED);
-        last_cycle = __atomic_load_n(&record_->last_cycle, __ATOMIC_RELAXED);
+        last_code = seen_code_(__atomic_load_n(&record_->last_code, __ATOMIC_RELAXED));
+        last_cycle = seen_cycle_(__atomic_load_n(&record_->last_cycle, __ATOMIC_RELAXED));
         if (supervision_ == nullptr) return;
         const std::uint64_t progress = __atomic_load_n(&supervision_->progress, __ATOMIC_ACQUIRE);
         if (progress != seen_) {
@@ -67,6 +69,8 @@ private:
     static constexpr std::uint64_t no_count = UINT64_MAX;
     const hal_faults* record_ = nullptr;
     const hal_supervision* supervision_ = nullptr;
+    hal::JournaledValue<std::uint64_t> seen_count_, seen_cleared_, seen_cycle_;
+    hal::JournaledValue<std::uint32_t> seen_code_;
     std::uint64_t seen_ = 0;
     std::uint64_t acknowledged_ = no_count;  // count at the last edge of reset
     hal::RisingEdge reset_edge_{true};  // TRUE from the first cycle on: not a rising edge

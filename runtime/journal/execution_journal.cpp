@@ -184,6 +184,7 @@ void ExecutionJournal::rejected(JournaledTransaction transaction) {
 }
 
 void ExecutionJournal::written(std::vector<std::pair<std::string, std::uint64_t>> values) {
+    if (values.empty()) return;
     ExecutionEntry entry{.kind = ExecutionEntry::Kind::written};
     entry.values = std::move(values);
     add(std::move(entry));

@@ -538,7 +538,23 @@ bool ReExecution::make_next_edit() {
     while (entry_ < entries.size() && waits_for_nothing(entries[entry_])) {
         make(entries[entry_++]);
     }
+    make_writes_before_samples();
     return true;
+}
+
+/// No cycle may need the values that programs wrote, to pins without a link, but those of the
+/// cycles behind them are recorded.
+void ReExecution::make_writes_before_samples() {
+    const std::vector<ExecutionEntry>& entries = file_.entries();
+    std::size_t end = entry_;
+    while (end < entries.size() && entries[end].kind == ExecutionEntry::Kind::written) {
+        ++end;
+    }
+    const bool begins_samples =
+        end < entries.size() && entries[end].kind == ExecutionEntry::Kind::sampled;
+    while (begins_samples && entry_ <= end) {
+        make(entries[entry_++]);
+    }
 }
 
 bool ReExecution::make(const ExecutionEntry& entry) {

@@ -148,6 +148,7 @@ private:
     bool catch_up();
     std::vector<Core*> cores() const;
     bool make_next_edit();
+    void make_writes_before_samples();
     bool make(const ExecutionEntry& entry);
     bool make_edit(const ExecutionEntry& entry);
     bool make_withdrawn(const ExecutionEntry& entry);

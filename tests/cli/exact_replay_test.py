@@ -881,6 +881,24 @@ start
             r"checksum\nto have the value named, write the journal with: --values '\*'",
         )
 
+    def test_faults_that_another_thread_raises_while_they_are_read(self):
+        machine = self.run_journaled(
+            """loadrt threads name1=fast period1=200000 supervise1=60s name2=servo period2=1000000 supervise2=60s
+loadrt raiser
+loadrt sum2 count=300
+loadrt faults
+addf raiser.0 fast
+"""
+            + "".join(f"addf sum2.{number} servo\n" for number in range(300))
+            + "addf faults servo\nstart\n",
+            "--values",
+            "faults.*",
+        )
+        wait_until(lambda: int(self.shell("getp", "faults.count").stdout) > 10_000, "faults")
+        self.finish(machine)
+        self.assertRegex(self.replay(), r"\nno difference, \d{4,} values compared\n$")
+
+    @unittest.skipIf(SANITIZED, "a sanitizer has the functions of the clock")
     def test_what_a_helper_thread_computes_is_recorded_by_its_component(self):
         machine = self.run_journaled(
             """loadrt threads name1=servo period1=1000000
