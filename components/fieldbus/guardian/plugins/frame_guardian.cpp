@@ -158,7 +158,7 @@ private:
     }
 
     void check_link() const {
-        if (!link_.get().starts_with("scocan:")) return;
+        if (!hal::can::describe(link_.get()).in_slots) return;
         throw hal::ArgumentError("link", "link: '" + link_.get() +
                                              "' is a node of this process, and the guardian is "
                                              "another one; write the address of the bus");
