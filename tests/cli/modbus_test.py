@@ -73,6 +73,13 @@ class Modbus(Case):
             )
             closer.join()
 
+    def test_slaves_make_no_connection(self):
+        self.assertEqual(
+            "hal node modbus: tcp:127.0.0.1:15020 makes a connection, and slaves wait for one; "
+            "write --link listen:127.0.0.1:15020\n",
+            self.bad("node", "modbus", "bus.modbus", "--link", "tcp:127.0.0.1:15020"),
+        )
+
     def test_check_and_plan(self):
         self.assertEqual(
             "bus.modbus: 2 slaves, 7 values, 6 telegrams\n",

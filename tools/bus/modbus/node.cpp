@@ -52,6 +52,12 @@ line::Opened open_line(const ModbusNodeOptions& options, const Bus& bus, std::st
     const std::string listening = line::listening_address(bus.link);
     if (!options.link.empty()) {
         link = options.link;
+        if (const std::string own = line::listening_address(link); !own.empty()) {
+            line::Opened rejected;
+            rejected.problem =
+                link + " makes a connection, and slaves wait for one; write --link " + own;
+            return rejected;
+        }
     } else {
         link = listening.empty() ? bus.link : listening;
     }
