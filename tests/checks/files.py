@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """files.py ROOT: every folder has a README that names only files that exist; every page links to existing files; every file and folder
-that a page about the inside names exists; every source has its licence line."""
+that a page about the inside names exists, and so does every function, member and test; every source has its licence line.
+"""
+
 import os
 import re
 import subprocess
@@ -9,6 +11,7 @@ import sys
 from pathlib import Path
 
 SOURCES = {".c", ".h", ".cpp", ".hpp", ".py", ".sh", ".cmake"}
+CODE = SOURCES | {".js", ".awk"}
 # Folders that the parent's README describes: data, one folder per case, and folders of folders.
 NO_README = (
     "runtime/abi/hal",
@@ -34,6 +37,38 @@ INSIDE = "docs/internals"
 NAMED_INSIDE = re.compile(
     r"`((?:[\w.-]+/)*[\w.-]+\.(?:c|cpp|hpp|h|py|sh|md|hal|ini|expected|cmake|txt|js|lua)|(?:[\w.-]+/)+)`"
 )
+# Names in code, of which one with an underscore or a scope can be nothing else: `Core::take_over`, `make_plan()`.
+CODE_INSIDE = re.compile(r"`((?:\w+::)*~?\w+)(?:\([^`]*\))?`")
+WORD = re.compile(r"[A-Za-z_]\w*")
+
+
+def unfenced(text):
+    """(line number, line) of each line outside of blocks of code."""
+    fenced = False
+    for number, line in enumerate(text.splitlines(), 1):
+        if line.lstrip().startswith("```"):
+            fenced = not fenced
+        elif not fenced:
+            yield number, line
+
+
+def names_inside(root, page):
+    """(line number, name) of each name in code on a page about the inside."""
+    for number, line in unfenced((root / page).read_text(errors="replace")):
+        for name in CODE_INSIDE.findall(line):
+            if ("_" in name or "::" in name) and "NAME" not in name:
+                yield number, name
+
+
+def unknown_words(root, files, words):
+    """Those of `words` that no source has, nor the name of a file."""
+    unknown = words - set(WORD.findall(" ".join(f.as_posix() for f in files)))
+    for path in files:
+        if path.suffix in CODE or path.name == "CMakeLists.txt":
+            text = (root / path).read_text(errors="replace")
+            near = [word for word in unknown if word in text]
+            unknown -= {word for word in near if re.search(rf"\b{word}\b", text)}
+    return unknown
 
 
 def ends_of(files):
@@ -48,7 +83,7 @@ def ends_of(files):
 
 def absent_inside(root, page, ends):
     """(line number, name) of each file or folder that a page about the inside names and that does not exist."""
-    for number, line in enumerate((root / page).read_text(errors="replace").splitlines(), 1):
+    for number, line in unfenced((root / page).read_text(errors="replace")):
         for name in NAMED_INSIDE.findall(line):
             if "NAME" not in name and name not in ends:
                 yield number, name
@@ -58,7 +93,7 @@ def absent(root, page, files):
     """(line number, name) of each file that `page` links to or, in a README, mentions and that exists neither near it (in the folder above or below
     that), nor at that path from the root or from an include path of the sdk."""
     near = [f.as_posix() for f in files if page.parent.parent in f.parents]
-    for number, line in enumerate((root / page).read_text(errors="replace").splitlines(), 1):
+    for number, line in unfenced((root / page).read_text(errors="replace")):
         for quoted, link in MENTIONED.findall(line):
             if quoted and page.name != "README.md":
                 continue  # a tutorial names files that its reader creates
@@ -113,12 +148,17 @@ def main(root):
                 f"{name}: missing README.md: purpose, what the folder must not do, where to start reading"
             )
     ends = ends_of(files)
+    inside = [f for f in files if f.suffix == ".md" and f.parent.as_posix() == INSIDE]
+    names = {page: list(names_inside(root, page)) for page in inside}
+    words = {word for found in names.values() for _, name in found for word in WORD.findall(name)}
+    unknown = unknown_words(root, files, words)
     for page in files:
         if page.suffix != ".md":
             continue
         missing = list(absent(root, page, files))
         if page.parent.as_posix() == INSIDE:
             missing += absent_inside(root, page, ends)
+            missing += [named for named in names[page] if unknown & set(WORD.findall(named[1]))]
         errors += [
             f"{page}:{number}: mentions {name}, which does not exist"
             for number, name in sorted(set(missing))
