@@ -20,19 +20,14 @@ std::vector<const T*> sorted(std::vector<const T*> all) {
 
 }  // namespace
 
-namespace {
-
-struct TextHash {
-    using is_transparent = void;
-    std::size_t operator()(std::string_view text) const {
-        return std::hash<std::string_view>{}(text);
-    }
-};
-
-}  // namespace
-
 struct Model::Texts {
-    std::unordered_set<std::string, TextHash, std::equal_to<>> all;
+    struct Hash {
+        using is_transparent = void;
+        std::size_t operator()(std::string_view text) const {
+            return std::hash<std::string_view>{}(text);
+        }
+    };
+    std::unordered_set<std::string, Hash, std::equal_to<>> all;
 };
 
 Pin* Model::find_pin(std::string_view name) const { return pin.find(name); }

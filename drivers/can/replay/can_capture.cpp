@@ -20,7 +20,7 @@ struct CanPart {
     bool flexible = false;  // a frame of CAN FD
 };
 
-/// What is left behind the header of the interface, whose protocol says whether it is CAN FD.
+/// Returns the part behind the header of the interface, whose protocol distinguishes CAN FD.
 std::optional<CanPart> part_of_cooked(std::string_view packet) {
     constexpr unsigned classic = 0x000c;
     constexpr unsigned fd = 0x000d;
@@ -32,7 +32,7 @@ std::optional<CanPart> part_of_cooked(std::string_view packet) {
     return CanPart{packet.substr(header), protocol == fd};
 }
 
-/// Without that header, the flags and the length say whether it is CAN FD.
+/// Without that header, the flags and the length distinguish CAN FD.
 std::optional<CanPart> part_of_plain(std::string_view packet) {
     if (packet.size() < 8) return std::nullopt;
     const bool marked = (static_cast<unsigned char>(packet[5]) & 4) != 0;
