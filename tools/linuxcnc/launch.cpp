@@ -157,7 +157,10 @@ bool Launch::load_module(const Words& module) {
 bool Launch::load_netlists() {
     if (!step("load the netlists of [HAL]HALFILE")) return false;
     const int status = machine_.shell.run_halfiles(configuration_.given, output_);
-    return (status == 0 || options_.keep_going) && !machine_.stop.requested();
+    if (status != 0 && !options_.keep_going) return false;
+    // before task registers its pins meanwhile: in a re-execution no cycle needs these
+    if (journal_ && journal_->begin_values(machine_) != 0) return false;
+    return !machine_.stop.requested();
 }
 
 bool Launch::start_threads() {
@@ -171,7 +174,6 @@ bool Launch::start_threads() {
         return false;
     }
     if (!step("start the threads")) return false;
-    if (journal_ && journal_->begin_values(machine_) != 0) return false;
     machine_.start_threads();
     return !machine_.stop.requested();
 }
