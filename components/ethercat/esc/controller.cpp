@@ -158,8 +158,8 @@ void Controller::update_interest() noexcept {
         has_alias ? get<std::uint16_t>(&memory_[registers::station_alias]) : interest.station;
     interest.has_events = (get<std::uint16_t>(&memory_[registers::ecat_event_mask]) &
                            get<std::uint16_t>(&memory_[registers::ecat_event])) != 0;
-    interest.first_logical = fmmus_.first();
-    interest.end_logical = fmmus_.last();
+    interest.first_logical = fmmus_.first_address();
+    interest.end_logical = fmmus_.end_address();
     interest.maps_registers = fmmus_.reaches_below(controller_facts::first_memory);
     interest.due_ns = due_ns_;
     const bool waits = application_ != nullptr && application_->waits();

@@ -41,8 +41,8 @@ public:
     bool hit(std::uint64_t address, std::size_t length) const noexcept {
         return address < end_ && address + length > first_;
     }
-    std::uint64_t first() const noexcept { return first_; }  ///< of the logical addresses
-    std::uint64_t last() const noexcept { return end_; }     ///< the one behind them
+    std::uint64_t first_address() const noexcept { return first_; }  ///< of the logical addresses
+    std::uint64_t end_address() const noexcept { return end_; }  ///< the one behind them
     /// Returns whether an active FMMU maps memory below an address.
     bool reaches_below(std::uint32_t address) const noexcept { return lowest_ < address; }
     const Unit* begin() const noexcept { return units_.data(); }
