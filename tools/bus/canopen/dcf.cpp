@@ -76,6 +76,67 @@ void date(eds::DeviceDescription& description, const DcfReadOptions& options) {
     file.modification_time = fmt::format("{:%I:%M%p}", day);
 }
 
+/// Reads the settings of a node into its description.
+class SettingsReader {
+public:
+    SettingsReader(const DcfReadOptions& options, std::uint8_t node, const ObjectNames& names,
+                   NodeClient& station)
+        : options_(options), node_(node), names_(names), station_(station) {}
+
+    /// A setting that the node rejects is skipped. Returns 1 after printing any other failure.
+    int read(eds::DeviceDescription& description) {
+        for (eds::Object& object : description.objects) {
+            for (eds::Entry& entry : object.entries) {
+                entry.parameter_value.clear();
+                if (!is_setting(object.index, entry)) continue;
+                if (const int status = read(object.index, entry); status != 0) return status;
+            }
+        }
+        return 0;
+    }
+    std::string summary() const {
+        std::string text = fmt::format("{} settings of node {}", read_, node_);
+        if (skipped_ != 0) {
+            text += fmt::format(", {} skipped", skipped_);
+        }
+        return text;
+    }
+
+private:
+    int read(std::uint16_t index, eds::Entry& entry) {
+        SdoRequest request;
+        const std::string label = names_.named(index, entry.sub).label();
+        switch (read_object(station_, node_, index, entry.sub, bytes_, request)) {
+        case Read::failed: return station_.fail_transfer(node_, request, label);
+        case Read::refused:
+            ++skipped_;
+            fail(options_,
+                 fmt::format("skipped: {}: {} (0x{:08X})", label, canopen::to_string(request.abort),
+                             static_cast<std::uint32_t>(request.abort)));
+            return 0;
+        case Read::value: break;
+        }
+        ++read_;
+        entry.parameter_value = spelled(entry);
+        return 0;
+    }
+    /// As in the description where equal ($NODEID), so that the file also fits a node with another
+    /// ID.
+    std::string spelled(const eds::Entry& entry) const {
+        const eds::Encoded usual = eds::encode(entry.default_value, entry.data_type, node_);
+        const bool is_usual = usual && usual.bytes == bytes_ && !bytes_.empty();
+        return is_usual ? entry.default_value : eds::spell(bytes_, entry.data_type);
+    }
+
+    const DcfReadOptions& options_;
+    const std::uint8_t node_;
+    const ObjectNames& names_;
+    NodeClient& station_;
+    std::vector<std::uint8_t> bytes_;
+    std::size_t read_ = 0;
+    std::size_t skipped_ = 0;
+};
+
 }  // namespace
 
 int run_can_dcf_read(const DcfReadOptions& options) {
@@ -89,37 +150,11 @@ int run_can_dcf_read(const DcfReadOptions& options) {
     if (!node_of(options, options.words[1], node) || !names.load_objects(options, options.eds)) {
         return 1;
     }
-    eds::DeviceDescription description = *names.description();
     NodeClient station(options, options.timeout_ns);
     if (!station.open(options.words[0])) return 1;
-    std::size_t read = 0;
-    std::size_t refused = 0;
-    std::vector<std::uint8_t> bytes;
-    for (eds::Object& object : description.objects) {
-        for (eds::Entry& entry : object.entries) {
-            entry.parameter_value.clear();
-            if (!is_setting(object.index, entry)) continue;
-            SdoRequest request;
-            const std::string label = names.named(object.index, entry.sub).label();
-            switch (read_object(station, node, object.index, entry.sub, bytes, request)) {
-            case Read::failed: return station.fail_transfer(node, request, label);
-            case Read::refused:
-                ++refused;
-                fail(options, fmt::format("skipped: {}: {} (0x{:08X})", label,
-                                          canopen::to_string(request.abort),
-                                          static_cast<std::uint32_t>(request.abort)));
-                continue;
-            case Read::value: break;
-            }
-            ++read;
-            // As in the description where equal ($NODEID), so that the file also fits a node with
-            // another ID.
-            const eds::Encoded usual = eds::encode(entry.default_value, entry.data_type, node);
-            entry.parameter_value = usual && usual.bytes == bytes && !bytes.empty()
-                                        ? entry.default_value
-                                        : eds::spell(bytes, entry.data_type);
-        }
-    }
+    eds::DeviceDescription description = *names.description();
+    SettingsReader reader(options, node, names, station);
+    if (const int status = reader.read(description); status != 0) return status;
     date(description, options);
     eds::Commissioning& commissioning = description.commissioning.emplace();
     commissioning.node_id = node;
@@ -127,13 +162,10 @@ int run_can_dcf_read(const DcfReadOptions& options) {
         static_cast<std::uint16_t>(station.bus.link->description().bit_rate / 1000);
     const std::string text = eds::write_eds(description);
     if (options.output.empty()) return exit_code(print(text));
-    if (const std::string wrong = write_file(options.output, text); !wrong.empty()) {
-        return fail(options, fmt::format("cannot write '{}': {}", options.output, wrong));
+    if (const std::string problem = write_file(options.output, text); !problem.empty()) {
+        return fail(options, fmt::format("cannot write '{}': {}", options.output, problem));
     }
-    return print(fmt::format("{}: {} settings of node {}{}\n", options.output, read, node,
-                             refused == 0 ? "" : fmt::format(", {} skipped", refused)))
-               ? 0
-               : 1;
+    return exit_code(print(fmt::format("{}: {}\n", options.output, reader.summary())));
 }
 
 namespace {

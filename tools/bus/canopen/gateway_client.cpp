@@ -14,6 +14,7 @@
 
 #include <cerrno>
 #include <cstring>
+#include <optional>
 
 #include "bus/can/bus.hpp"
 #include "canopen/master/gateway/gateway_command.hpp"
@@ -24,60 +25,86 @@ namespace hal::tools {
 
 namespace {
 
-/// Connects a socket; returns -1 after printing the reason.
-int connect_to_gateway(const GatewayOptions& options) {
-    const std::string& endpoint = options.connect;
-    const auto colon = endpoint.rfind(':');
-    const std::string port = colon == endpoint.npos ? "" : endpoint.substr(colon + 1);
-    const bool tcp = !port.empty() && endpoint.find('/') == endpoint.npos &&
-                     port.find_first_not_of("0123456789") == port.npos;
-    std::string why;
-    int fd = -1;
-    if (tcp) {
-        addrinfo how{}, *found = nullptr;
-        how.ai_socktype = SOCK_STREAM;
-        if (const int code =
-                ::getaddrinfo(endpoint.substr(0, colon).c_str(), port.c_str(), &how, &found);
-            code != 0) {
-            fail(options,
-                 fmt::format("invalid --connect '{}': {}; write HOST:PORT, such as 127.0.0.1:6000",
-                             endpoint, ::gai_strerror(code)));
+struct TcpEndpoint {
+    std::string host;
+    std::string port;
+};
 
-            return -1;
-        }
-        for (const addrinfo* at = found; at != nullptr && fd < 0; at = at->ai_next) {
-            fd = ::socket(at->ai_family, at->ai_socktype | SOCK_CLOEXEC, at->ai_protocol);
-            if (fd >= 0 && ::connect(fd, at->ai_addr, at->ai_addrlen) == 0) break;
-            why = std::strerror(errno);
-            if (fd >= 0) {
-                ::close(fd);
-            }
-            fd = -1;
-        }
-        if (found != nullptr) {
-            ::freeaddrinfo(found);
-        }
-    } else {
-        sockaddr_un at{};
-        at.sun_family = AF_UNIX;
-        if (endpoint.size() >= sizeof at.sun_path) {
-            fail(options, fmt::format("path too long for a socket: '{}'", endpoint));
-            return -1;
-        }
-        std::memcpy(at.sun_path, endpoint.c_str(), endpoint.size() + 1);
-        fd = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
-        if (::connect(fd, reinterpret_cast<const sockaddr*>(&at), sizeof at) != 0) {
-            why = std::strerror(errno);
-            ::close(fd);
-            fd = -1;
-        }
+/// HOST:PORT. Nothing for the path of a socket.
+std::optional<TcpEndpoint> tcp_endpoint(const std::string& endpoint) {
+    const auto colon = endpoint.rfind(':');
+    if (colon == endpoint.npos || endpoint.find('/') != endpoint.npos) return std::nullopt;
+    const std::string port = endpoint.substr(colon + 1);
+    const bool is_number = !port.empty() && port.find_first_not_of("0123456789") == port.npos;
+    if (!is_number) return std::nullopt;
+    return TcpEndpoint{endpoint.substr(0, colon), port};
+}
+
+/// Connects a stream socket. Returns -1 with the reason in errno.
+int connect_to(const sockaddr* address, socklen_t size) {
+    const int fd = ::socket(address->sa_family, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    if (fd < 0) return -1;
+    if (::connect(fd, address, size) == 0) return fd;
+    const int error = errno;
+    ::close(fd);
+    errno = error;
+    return -1;
+}
+
+void report_unconnected(const GatewayOptions& options, int error, const char* listening_option) {
+    fail(options,
+         fmt::format("cannot connect to the gateway at '{}': {}; start one with: hal can "
+                     "gateway ADDRESS {} {}",
+                     options.connect, std::strerror(error), listening_option, options.connect));
+}
+
+/// Connects to the first address of the host that accepts. Returns -1 after printing the reason.
+int connect_tcp(const GatewayOptions& options, const TcpEndpoint& endpoint) {
+    addrinfo hints{};
+    hints.ai_socktype = SOCK_STREAM;
+    addrinfo* addresses = nullptr;
+    const int problem =
+        ::getaddrinfo(endpoint.host.c_str(), endpoint.port.c_str(), &hints, &addresses);
+    if (problem != 0) {
+        fail(options,
+             fmt::format("invalid --connect '{}': {}; write HOST:PORT, such as 127.0.0.1:6000",
+                         options.connect, ::gai_strerror(problem)));
+        return -1;
     }
+    int fd = -1;
+    int error = 0;
+    for (const addrinfo* address = addresses; address && fd < 0; address = address->ai_next) {
+        fd = connect_to(address->ai_addr, address->ai_addrlen);
+        error = errno;
+    }
+    ::freeaddrinfo(addresses);
     if (fd < 0) {
-        fail(options, fmt::format("cannot connect to the gateway at '{}': {}; start one with: hal "
-                                  "can gateway ADDRESS {} {}",
-                                  endpoint, why, tcp ? "--listen" : "--socket", endpoint));
+        report_unconnected(options, error, "--listen");
     }
     return fd;
+}
+
+/// Connects to a socket in the file system. Returns -1 after printing the reason.
+int connect_unix(const GatewayOptions& options) {
+    const std::string& path = options.connect;
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    if (path.size() >= sizeof address.sun_path) {
+        fail(options, fmt::format("path too long for a socket: '{}'", path));
+        return -1;
+    }
+    std::memcpy(address.sun_path, path.c_str(), path.size() + 1);
+    const int fd = connect_to(reinterpret_cast<const sockaddr*>(&address), sizeof address);
+    if (fd < 0) {
+        report_unconnected(options, errno, "--socket");
+    }
+    return fd;
+}
+
+/// Connects a socket; returns -1 after printing the reason.
+int connect_to_gateway(const GatewayOptions& options) {
+    const std::optional<TcpEndpoint> tcp = tcp_endpoint(options.connect);
+    return tcp ? connect_tcp(options, *tcp) : connect_unix(options);
 }
 
 /// Formats `1 5 EMCY … #life guard error`: net and node by name, the comment as part of the

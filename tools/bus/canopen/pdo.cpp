@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <fmt/core.h>
+#include <span>
 
 #include "bus/canopen/pdo_settings.hpp"
 #include "bus/json_text.hpp"
@@ -237,6 +238,72 @@ bool present(NodeClient& station, const Options& options, std::uint8_t node,
     return false;
 }
 
+/// Replaces the mapping by the objects after the PDO on the command line, if there are any. Returns
+/// false after printing the reason.
+bool map_objects(const PdoMapOptions& options, NodeClient& station, std::uint8_t node,
+                 const ObjectNames& names, PdoSettings& p) {
+    const std::span<const std::string> objects = std::span(options.words).subspan(3);
+    if (!objects.empty()) {
+        p.mapping.clear();
+    }
+    for (const std::string& word : objects) {
+        PdoSettings::Item item;
+        std::string problem;
+        if (!parse_item(station, node, names, word, item, problem)) {
+            fail(options, problem);
+            return false;
+        }
+        p.mapping.push_back(std::move(item));
+    }
+    if (p.bits() > 64) {
+        fail(options,
+             fmt::format(
+                 "mapping too long: {} bits, a PDO holds 64; map {} bits less, or use a second PDO",
+                 p.bits(), p.bits() - 64));
+        return false;
+    }
+    return true;
+}
+
+/// Writes the new settings; at a failure the old ones again. Returns the exit status.
+int write_or_restore(const PdoMapOptions& options, NodeClient& station, std::uint8_t node,
+                     const PdoSettings& before, const PdoSettings& after) {
+    SdoRequest last;
+    const Step* failed = nullptr;
+    const std::vector<Step> steps = steps_to(after, before.cob);
+    if (write_steps(station, node, steps, failed, last)) return 0;
+    const std::string step =
+        fmt::format("{:04X}:{:X} (to {})", failed->index, failed->sub, failed->what);
+    const int status = station.fail_transfer(node, last, step);
+    const std::vector<Step> back = steps_to(before, before.cob);
+    const bool restored =
+        !station.bus.stop.requested() && write_steps(station, node, back, failed, last);
+    fail(options, restored ? fmt::format("{} restored", before.name())
+                           : fmt::format("{} may be disabled now; to check: hal can pdo show",
+                                         before.name()));
+    return status;
+}
+
+bool are_equal(const PdoSettings& a, const PdoSettings& b) {
+    return std::ranges::equal(a.mapping, b.mapping, {}, &PdoSettings::Item::entry,
+                              &PdoSettings::Item::entry) &&
+           a.transmission == b.transmission && a.cob == b.cob;
+}
+
+/// Prints what the node has after the writes. Returns the exit status.
+int print_written(const PdoMapOptions& options, NodeClient& station, std::uint8_t node,
+                  const ObjectNames& names, const PdoSettings& written) {
+    PdoSettings now = written;
+    if (read_pdo(station, node, names, now) != Abort::none) {
+        return fail(options, "cannot read back the written values");
+    }
+    const bool printed = print(lines_of(now));
+    if (!are_equal(now, written)) {
+        return fail(options, "the node accepted every write but has other values now, as shown");
+    }
+    return exit_code(printed);
+}
+
 }  // namespace
 
 int run_can_pdo_map(const PdoMapOptions& options) {
@@ -249,65 +316,17 @@ int run_can_pdo_map(const PdoMapOptions& options) {
         return 1;
     }
     PdoSettings after = before;
-    std::string problem;
-    if (options.words.size() > 3) {
-        after.mapping.clear();
-    }
-    for (std::size_t n = 3; n < options.words.size(); ++n) {
-        PdoSettings::Item item;
-        if (!parse_item(station, node, names, options.words[n], item, problem)) {
-            return fail(options, problem);
-        }
-        after.mapping.push_back(std::move(item));
-    }
-    if (after.bits() > 64) {
-        return fail(
-            options,
-            fmt::format(
-                "mapping too long: {} bits, a PDO holds 64; map {} bits less, or use a second PDO",
-                after.bits(), after.bits() - 64));
-    }
+    if (!map_objects(options, station, node, names, after)) return 1;
     if (!parse_options(options, after)) return 1;
     after.cob &= ~canopen::cob_invalid;
     if (canopen::cob_id(after.cob) == 0) {
+        const unsigned default_id = (after.received ? 0x200U : 0x180U) + node;
         return fail(options, fmt::format("{} has no identifier; add --id, such as --id {:X}",
-                                         after.name(), (after.received ? 0x200U : 0x180U) + node));
+                                         after.name(), default_id));
     }
-    SdoRequest last;
-    const Step* failed = nullptr;
-    const std::vector<Step> steps = steps_to(after, before.cob);
-
-    const std::vector<Step> back = steps_to(before, before.cob);
-    if (!write_steps(station, node, steps, failed, last)) {
-        const std::string step =
-            fmt::format("{:04X}:{:X} (to {})", failed->index, failed->sub, failed->what);
-        const int status = station.fail_transfer(node, last, step);
-        const bool restored =
-            !station.bus.stop.requested() && write_steps(station, node, back, failed, last);
-        fail(options, restored ? fmt::format("{} restored", before.name())
-                               : fmt::format("{} may be disabled now; to check: hal can pdo show",
-                                             before.name()));
-
-        return status;
-    }
-    PdoSettings now = after;
-    if (const Abort why = read_pdo(station, node, names, now); why != Abort::none) {
-        return fail(options, "cannot read back the written values");
-    }
-    const auto entries = [](const PdoSettings& p) {
-        std::vector<std::uint32_t> all;
-        for (const auto& item : p.mapping) {
-            all.push_back(item.entry());
-        }
-        return all;
-    };
-    if (entries(now) != entries(after) || now.transmission != after.transmission ||
-        now.cob != after.cob) {
-        print(lines_of(now));
-
-        return fail(options, "the node accepted every write but has other values now, as shown");
-    }
-    return exit_code(print(lines_of(now)));
+    const int status = write_or_restore(options, station, node, before, after);
+    if (status != 0) return status;
+    return print_written(options, station, node, names, after);
 }
 
 namespace {

@@ -165,31 +165,42 @@ Timeline timeline_of(const Table& table, const can_timing::Analysis& a) {
     return timeline;
 }
 
+/// Explains a late message of a bus whose nodes send in order of arrival.
+std::string late_in_queue(const Row& row, std::int64_t worst_ns) {
+    const std::string needed = worst_ns < 0 ? "more than the bus has" : ms(worst_ns) + " ms";
+    const bool is_within_deadline =
+        worst_ns > row.message.period && worst_ns <= row.message.limit();
+    if (is_within_deadline) {
+        return fmt::format(
+            "{} needs {}, more than its period: with queues in order of arrival nothing is known "
+            "then",
+            called(row), needed);
+    }
+    return fmt::format("{} needs {}, deadline {} ms", called(row), needed, ms(row.message.limit()));
+}
+
+/// Explains a message for which the ones before it leave no time.
+std::string never_sent(const Row& row, const std::vector<can_timing::Message>& messages,
+                       const can_timing::Analysis& a, std::size_t i) {
+    double use = 0;
+    for (std::size_t k = 0; k < messages.size(); ++k) {
+        if (k == i || can_timing::before(messages[k], messages[i])) {
+            use +=
+                static_cast<double>(a.responses[k].frame) / static_cast<double>(messages[k].period);
+        }
+    }
+    return fmt::format(
+        "{} may never be sent: with the messages before it, it needs {:.1f} % of the bus time",
+        called(row), 100 * use);
+}
+
 /// Explains the response time of a late message.
 std::string why_late(const Table& table, const std::vector<can_timing::Message>& messages,
                      const can_timing::Analysis& a, std::size_t i) {
     const can_timing::Response& r = a.responses[i];
     const Row& row = table.rows[i];
-    if (table.queues) {
-        return fmt::format(
-            "{} needs {}, {}", called(row),
-            r.worst < 0 ? "more than the bus has" : ms(r.worst) + " ms",
-            r.worst > row.message.period && r.worst <= row.message.limit()
-                ? "more than its period: with queues in order of arrival nothing is known then"
-                : fmt::format("deadline {} ms", ms(row.message.limit())));
-    }
-    if (r.worst < 0) {
-        double use = 0;
-        for (std::size_t k = 0; k < messages.size(); ++k) {
-            if (k == i || can_timing::before(messages[k], messages[i])) {
-                use += static_cast<double>(a.responses[k].frame) /
-                       static_cast<double>(messages[k].period);
-            }
-        }
-        return fmt::format(
-            "{} may never be sent: with the messages before it, it needs {:.1f} % of the bus time",
-            called(row), 100 * use);
-    }
+    if (table.queues) return late_in_queue(row, r.worst);
+    if (r.worst < 0) return never_sent(row, messages, a, i);
     std::string text = fmt::format("{} needs {} ms, deadline {} ms:", called(row), ms(r.worst),
                                    ms(row.message.limit()));
     if (r.errors > 0) {
@@ -372,16 +383,19 @@ int report_plan(const CanopenPlanOptions& options, const std::string& file, cons
         return 1;
     }
     if (a.fits) return 0;
+    constexpr std::size_t max_explained = 3;
     std::string text;
     std::size_t late = 0;
     for (std::size_t i = 0; i < messages.size(); ++i) {
-        if (a.responses[i].in_time || ++late > 3) continue;
+        if (a.responses[i].in_time) continue;
+        ++late;
+        if (late > max_explained) continue;
         const std::string location =
             table.rows[i].line == 0 ? file : fmt::format("{}:{}", file, table.rows[i].line);
         text += fmt::format("{}: {}\n", location, why_late(table, messages, a, i));
     }
-    if (late > 3) {
-        text += fmt::format("{}: {} more are late\n", file, late - 3);
+    if (late > max_explained) {
+        text += fmt::format("{}: {} more are late\n", file, late - max_explained);
     }
     write_all(STDERR_FILENO, text + help + help_text(table, messages));
     return 1;
@@ -389,15 +403,16 @@ int report_plan(const CanopenPlanOptions& options, const std::string& file, cons
 
 /// Parses "1/10ms" or "3".
 std::optional<can_timing::Errors> errors_of(const std::string& text) {
-    const std::size_t slash = std::min(text.find('/'), text.size());
+    const std::size_t slash = text.find('/');
     const auto burst = parse_natural(text.substr(0, slash));
-    const auto period = slash == text.size() ? std::optional<std::int64_t>(0)
-                                             : parse_duration_ns(text.substr(slash + 1));
-    if (!burst || *burst < 1 || *burst > 1000 || !period ||
-        (slash != text.size() && *period < 1000)) {
-        return std::nullopt;
+    if (!burst || *burst < 1 || *burst > 1000) return std::nullopt;
+    can_timing::Errors errors{static_cast<std::uint32_t>(*burst), 0};
+    if (slash != text.npos) {
+        const auto period = parse_duration_ns(text.substr(slash + 1));
+        if (!period || *period < 1000) return std::nullopt;
+        errors.period = *period;
     }
-    return can_timing::Errors{static_cast<std::uint32_t>(*burst), *period};
+    return errors;
 }
 
 /// Reads a recording. Returns false after printing what is wrong.
@@ -426,31 +441,26 @@ bool read_recording(const CanopenPlanOptions& options, const std::string& file, 
     }
     std::string problem;
     table = table_of(capture, *rate, problem);
-    return problem.empty() || (fail(options, fmt::format("{}: {}", file, problem)), false);
+    if (!problem.empty()) {
+        fail(options, fmt::format("{}: {}", file, problem));
+        return false;
+    }
+    return true;
 }
 
-}  // namespace
+int plan_recording(const CanopenPlanOptions& options, const std::string& file,
+                   const can_timing::Errors& errors) {
+    if (!options.cycle.empty()) {
+        return fail(options, "--cycle is for configurations; a recording has its own SYNCs");
+    }
+    Table table;
+    if (!read_recording(options, file, table)) return 1;
+    table.bus.errors = errors;
+    return report_plan(options, file, table, "");
+}
 
-int run_canopen_plan(const CanopenPlanOptions& options) {
-    const std::string& file = options.words[0];
-    can_timing::Errors errors;
-    if (!options.errors.empty()) {
-        const auto given = errors_of(options.errors);
-        if (!given) {
-            return fail(options, fmt::format("invalid --errors '{}'; write --errors 1/10ms",
-                                             options.errors));
-        }
-        errors = *given;
-    }
-    if (file.ends_with(".log") || file.ends_with(".pcapng") || file.ends_with(".pcap")) {
-        Table table;
-        if (!options.cycle.empty()) {
-            return fail(options, "--cycle is for configurations; a recording has its own SYNCs");
-        }
-        if (!read_recording(options, file, table)) return 1;
-        table.bus.errors = errors;
-        return report_plan(options, file, table, "");
-    }
+int plan_configuration(const CanopenPlanOptions& options, const std::string& file,
+                       const can_timing::Errors& errors) {
     if (!options.bitrate.empty()) {
         return fail(
             options,
@@ -473,23 +483,42 @@ int run_canopen_plan(const CanopenPlanOptions& options) {
     if (!cycle || *cycle < 1000) {
         return fail(options, fmt::format("invalid --cycle '{}'; write --cycle 1ms", options.cycle));
     }
-    Table table = table_of(config::schedule_of(reading.config, *cycle));
-    table.bus.errors = errors;
-    std::string help;
-    const bool every_cycle =
+    const bool syncs_every_cycle =
         reading.config.sync != config::SyncMode::none && reading.config.sync_period == 0;
-    if (!every_cycle && !options.cycle.empty()) {
+    if (!syncs_every_cycle && !options.cycle.empty()) {
         return fail(options, fmt::format("--cycle has no effect: {} sends no SYNC in every cycle; "
                                          "delete --cycle, or write `sync = cycle` in [bus]",
                                          file));
     }
-    if (every_cycle) {
+    std::string help;
+    if (syncs_every_cycle) {
         help = fmt::format(
             "  = help: the SYNC is sent every cycle of the thread, assumed to be {}; for another "
             "period add: --cycle 2ms\n",
             period);
     }
+    Table table = table_of(config::schedule_of(reading.config, *cycle));
+    table.bus.errors = errors;
     return report_plan(options, file, table, help);
+}
+
+}  // namespace
+
+int run_canopen_plan(const CanopenPlanOptions& options) {
+    const std::string& file = options.words[0];
+    can_timing::Errors errors;
+    if (!options.errors.empty()) {
+        const auto given = errors_of(options.errors);
+        if (!given) {
+            return fail(options, fmt::format("invalid --errors '{}'; write --errors 1/10ms",
+                                             options.errors));
+        }
+        errors = *given;
+    }
+    const bool is_recording =
+        file.ends_with(".log") || file.ends_with(".pcapng") || file.ends_with(".pcap");
+    return is_recording ? plan_recording(options, file, errors)
+                        : plan_configuration(options, file, errors);
 }
 
 int run_canopen_check(const CanopenCheckOptions& options) {

@@ -75,11 +75,93 @@ private:
     }
 };
 
+/// Reads the objects of a node one after the other, and writes them as CSV or prints them.
+class ReadAll {
+public:
+    ReadAll(const ReadAllOptions& options, std::uint8_t node, const ObjectNames& names,
+            NodeClient& station)
+        : options_(options), node_(node), names_(names), station_(station) {}
+
+    /// Returns the exit status, after printing the reason if it is not 0.
+    int run() {
+        for (const eds::Object& object : names_.description()->objects) {
+            for (const eds::Entry& entry : object.entries) {
+                if (const int status = handle(object.index, entry); status != 0) return status;
+            }
+        }
+        if (to_file()) {
+            const std::string problem = write_file(options_.output, csv_);
+            if (!problem.empty()) {
+                return fail(options_,
+                            fmt::format("cannot write '{}': {}", options_.output, problem));
+            }
+        }
+        return print_summary();
+    }
+
+private:
+    bool to_file() const { return !options_.output.empty(); }
+
+    int handle(std::uint16_t index, const eds::Entry& entry) {
+        ReadObject object{.object = names_.named(index, entry.sub),
+                          .access = eds::name_of(entry.access),
+                          .bytes = {},
+                          .asked = entry.readable()};
+        if (object.asked) {
+            if (const int status = read(object); status != 0) return status;
+        } else {
+            ++write_only_;
+        }
+        if (to_file()) {
+            csv_ += object.csv_line();
+            return 0;
+        }
+        return exit_code(print(options_.json ? object.json_line(node_) : object.table_line()));
+    }
+    /// A rejection by the node is a result; returns 1 for any other failure.
+    int read(ReadObject& object) {
+        canopen::SdoRequest request{.index = object.object.index,
+                                    .sub = object.object.sub,
+                                    .upload = true,
+                                    .buffer = {received_.get(), max_bytes}};
+        if (station_.transfer(node_, request)) {
+            ++read_;
+            object.bytes = {received_.get(), request.size};
+        } else if (request.aborted_by_server) {
+            ++rejected_;
+        } else {
+            return station_.fail_transfer(node_, request, object.object.label());
+        }
+        object.abort = request.abort;
+        return 0;
+    }
+    int print_summary() const {
+        const std::string summary =
+            fmt::format("{} objects of node {} read, {} rejected, {} write-only\n", read_, node_,
+                        rejected_, write_only_);
+        if (to_file()) return exit_code(print(options_.output + ": " + summary));
+        write_all(STDERR_FILENO, summary);
+        return 0;
+    }
+
+    static constexpr std::size_t max_bytes = 64 << 20;  // of one object
+
+    const ReadAllOptions& options_;
+    const std::uint8_t node_;
+    const ObjectNames& names_;
+    NodeClient& station_;
+    // uses memory only as far as it is filled
+    const std::unique_ptr<std::uint8_t[]> received_ =
+        std::make_unique_for_overwrite<std::uint8_t[]>(max_bytes);
+    std::string csv_ = "index,sub,name,type,access,value,data,reason\r\n";
+    std::size_t read_ = 0;
+    std::size_t rejected_ = 0;
+    std::size_t write_only_ = 0;
+};
+
 }  // namespace
 
 int run_can_read_all(const ReadAllOptions& options) {
-    // of one object; memory is used only as far as it is filled
-    constexpr std::size_t max_bytes = 64 << 20;
     if (options.words.size() != 2) {
         return fail(options,
                     "expected ADDRESS NODE; type: hal can read-all ADDRESS NODE --eds FILE");
@@ -94,51 +176,7 @@ int run_can_read_all(const ReadAllOptions& options) {
     }
     NodeClient station(options, options.timeout_ns);
     if (!station.open(options.words[0])) return 1;
-    const auto received = std::make_unique_for_overwrite<std::uint8_t[]>(max_bytes);
-    std::string csv = "index,sub,name,type,access,value,data,reason\r\n";
-    std::size_t read = 0;
-    std::size_t refused = 0;
-    std::size_t write_only = 0;
-    for (const eds::Object& object : names.description()->objects) {
-        for (const eds::Entry& entry : object.entries) {
-            ReadObject one{.object = names.named(object.index, entry.sub),
-                           .access = eds::name_of(entry.access),
-                           .bytes = {}};
-            one.asked = entry.readable();
-            if (one.asked) {
-                canopen::SdoRequest request{.index = object.index,
-                                            .sub = entry.sub,
-                                            .upload = true,
-                                            .buffer = {received.get(), max_bytes}};
-                const bool good = station.transfer(node, request);
-                if (!good && !request.aborted_by_server) {
-                    return station.fail_transfer(node, request, one.object.label());
-                }
-                one.abort = request.abort;
-                if (good) {
-                    one.bytes = {received.get(), request.size};
-                }
-                ++(good ? read : refused);
-            } else {
-                ++write_only;
-            }
-            if (!options.output.empty()) {
-                csv += one.csv_line();
-            } else if (!print(options.json ? one.json_line(node) : one.table_line())) {
-                return 1;
-            }
-        }
-    }
-    if (!options.output.empty()) {
-        if (const std::string wrong = write_file(options.output, csv); !wrong.empty()) {
-            return fail(options, fmt::format("cannot write '{}': {}", options.output, wrong));
-        }
-    }
-    const std::string sum = fmt::format("{} objects of node {} read, {} rejected, {} write-only\n",
-                                        read, node, refused, write_only);
-    if (!options.output.empty()) return exit_code(print(options.output + ": " + sum));
-    write_all(STDERR_FILENO, sum);
-    return 0;
+    return ReadAll(options, node, names, station).run();
 }
 
 }  // namespace hal::tools
