@@ -262,7 +262,6 @@ Declaration declaration_of(const Json& body) {
     return to;
 }
 
-/// Gives the component its pins and declared values. When that is rejected, a component that was
 /// Throws when a dead program has left a linked pin that this one, which is ready, does not have.
 void check_links(const Program& by, const Programs::Entry& entry) {
     const LoadedComponent* const component = by.session.model().find_component(entry.name);
@@ -275,10 +274,23 @@ void check_links(const Program& by, const Programs::Entry& entry) {
     }
 }
 
-/// Gives the component its pins and declared values. When that is rejected, a component that was
-/// `fresh` keeps the pins and links that its dead predecessor had, if any.
-void add_declared(const Program& by, Programs::Entry& entry, const Declaration& wanted, bool fresh,
-                  bool was_dead) {
+/// The component that a request names, seen from the program that declares it.
+enum class ComponentOrigin {
+    own,  ///< the program has declared it before
+    fresh,  ///< there was none of this name
+    successor,  ///< of one whose program is dead
+};
+
+ComponentOrigin origin_of(Programs& programs, const Program& by, const std::string& name) {
+    if (programs.owned(name, by.owner)) return ComponentOrigin::own;
+    const Programs::Entry* const there = programs.find(name);
+    return there && there->dead() ? ComponentOrigin::successor : ComponentOrigin::fresh;
+}
+
+/// Gives the component its pins and declared values. When that is rejected, a component that is not
+/// the program's own yet ends; that of a dead program keeps its pins and links.
+void add_declared(const Program& by, Programs::Entry& entry, const Declaration& wanted,
+                  ComponentOrigin origin) {
     Programs& programs = by.session.programs();
     try {
         const auto declared = values_by_number(entry, wanted.safe);
@@ -289,14 +301,14 @@ void add_declared(const Program& by, Programs::Entry& entry, const Declaration& 
             pin->safe = value;
             pin->flags |= HAL_PIN_SAFE;
         }
-        if (wanted.ready.value_or(fresh)) {
+        if (wanted.ready.value_or(origin != ComponentOrigin::own)) {
             check_links(by, entry);
         }
     } catch (const RequestError&) {
-        if (fresh && was_dead) {
-            programs.die(entry, "its pins were rejected");
-        } else if (fresh) {
-            programs.leave(entry);
+        switch (origin) {
+        case ComponentOrigin::own: break;
+        case ComponentOrigin::fresh: programs.leave(entry); break;
+        case ComponentOrigin::successor: programs.die(entry, "its pins were rejected"); break;
         }
         throw;
     }
@@ -324,33 +336,32 @@ void declare_component(const Program& by, const Json& body, std::string& reply) 
     const Declaration wanted = declaration_of(body);
     const auto lock = by.session.lock();
     Programs& programs = by.session.programs();
-    Programs::Entry* entry = programs.owned(wanted.name, by.owner);
-    const bool fresh = !entry;
-    const Programs::Entry* const there = programs.find(wanted.name);
-    const bool was_dead = there && there->dead();
-    if (fresh) {
-        const std::string why = programs.announce(by.peer, wanted.name, by.owner, false);
-        if (!why.empty()) {
-            throw RequestError{why};
+    const ComponentOrigin origin = origin_of(programs, by, wanted.name);
+    if (origin != ComponentOrigin::own) {
+        const bool ready = false;  // until it has its pins
+        const std::string problem = programs.announce(by.peer, wanted.name, by.owner, ready);
+        if (!problem.empty()) {
+            throw RequestError{problem};
         }
-        entry = programs.owned(wanted.name, by.owner);
     }
-    const std::size_t first = entry->pins.size();
-    add_declared(by, *entry, wanted, fresh, was_dead);
-    entry->timeout_ns = wanted.timeout_ns.value_or(entry->timeout_ns);
+    Programs::Entry& entry = *programs.owned(wanted.name, by.owner);
+    const std::size_t first_new = entry.pins.size();
+    add_declared(by, entry, wanted, origin);
+    entry.timeout_ns = wanted.timeout_ns.value_or(entry.timeout_ns);
     if (wanted.every_ns) {
-        programs.set_rate(*entry, *wanted.every_ns);
+        programs.set_rate(entry, *wanted.every_ns);
     } else {
-        programs.note_alive(*entry);
+        programs.note_alive(entry);
     }
     if (wanted.pins) {
-        reply += ",\"first\":" + std::to_string(first);
-        append_values(
-            reply, by,
-            {entry->pins.begin() + static_cast<std::ptrdiff_t>(first), entry->pins.end()});
+        const std::vector<Pin*> added(entry.pins.begin() + static_cast<std::ptrdiff_t>(first_new),
+                                      entry.pins.end());
+        reply += ",\"first\":" + std::to_string(first_new);
+        append_values(reply, by, added);
     }
-    if (wanted.ready || fresh) {
-        programs.set_ready(*entry, wanted.ready.value_or(true));
+    // a component that says nothing about it is ready with its first request
+    if (wanted.ready || origin != ComponentOrigin::own) {
+        programs.set_ready(entry, wanted.ready.value_or(true));
     }
 }
 

@@ -103,13 +103,16 @@ Component::~Component() {
 
 std::size_t Component::add(const std::string& name, int type, const std::string& dir,
                            const std::string& more) {
-    std::unique_lock lock(mutex_, std::defer_lock);
-    Item item{name, prefix_ + "." + name, hal::row(static_cast<hal_type>(type)),
-              dir,  Json::object(),       {},
-              false};
-    item.declared = Json::parse(more);
+    Item item{.name = name,
+              .full = prefix_ + "." + name,
+              .type = hal::row(static_cast<hal_type>(type)),
+              .dir = dir,
+              .declared = Json::parse(more),
+              .value = initial_value(static_cast<hal_type>(type))};
     item.declared.update(Json{{"name", name}, {"type", item.type.name}, {"dir", dir}});
-    item.value = initial_value(item.type.type);
+    // The items change under the mutex and the GIL: look-ups hold only the GIL, the flusher only
+    // the mutex. The mutex is locked without the GIL, for which its holder may wait.
+    std::unique_lock lock(mutex_, std::defer_lock);
     Json reply;
     {
         const ReleasedGil release_gil;
@@ -120,16 +123,16 @@ std::size_t Component::add(const std::string& name, int type, const std::string&
         reply = checked(client_->request(
             {{"component", name_}, {"prefix", prefix_}, {"pins", Json::array({item.declared})}}));
     }
-    // under the GIL and the mutex: look-ups hold only the GIL, the flusher only the mutex
-    // the current value of a pin that a dead predecessor left
     if (item.type.type != HAL_TYPE_PORT) {
+        // a pin that a dead predecessor left has a value
         item.value = reply.at("values").at(0);
     }
+    const std::size_t index = items_.size();
     prefixes_.push_back(prefix_);
     items_.push_back(std::move(item));
-    index_.emplace(name, items_.size() - 1);
+    index_.emplace(name, index);
     fetched_ = {};
-    return items_.size() - 1;
+    return index;
 }
 
 void Component::ready(bool on) {
