@@ -115,21 +115,21 @@ public:
             add(late_);
             return Sent::late;
         }
-        std::array<std::uint8_t, max_frame> own;
+        std::array<std::uint8_t, max_frame> buffer;
+        const std::span<std::uint8_t> copy{buffer.data(), frame.size()};
         if (launch.stamp_at != 0 || launch.finisher != nullptr) {
-            std::memcpy(own.data(), frame.data(), frame.size());
-            auto stamp = static_cast<std::uint64_t>(now + launch.stamp_add_ns);
-            for (unsigned i = 8; launch.stamp_at != 0 && i-- > 0; stamp >>= 8) {
-                own[launch.stamp_at + i] = static_cast<std::uint8_t>(stamp);
-            }
-            if (launch.finisher != nullptr) {
-                launch.finisher->leaves({own.data(), frame.size()});
-            }
-            frame = {own.data(), frame.size()};
+            std::copy(frame.begin(), frame.end(), copy.begin());
+            frame = copy;
+        }
+        if (launch.stamp_at != 0) {
+            stamp(copy.subspan(launch.stamp_at), now + launch.stamp_add_ns);
+        }
+        if (launch.finisher != nullptr) {
+            launch.finisher->leaves(copy);
         }
         if (!send_to_all(frame.subspan(header_bytes), now)) {
             if (launch.finisher != nullptr) {
-                launch.finisher->stayed({own.data(), frame.size()});
+                launch.finisher->stayed(copy);
             }
             add(dropped_);
             return Sent::full;
@@ -141,44 +141,29 @@ public:
     }
 
     std::optional<Arrival> receive(std::int64_t) noexcept override {
-        for (unsigned tries = 0; tries < datagrams_at_once; ++tries) {
-            sockaddr_in from{};
-            alignas(cmsghdr) char control[CMSG_SPACE(sizeof(timespec))];
-            iovec part{frame_.data() + header_bytes, frame_.size() - header_bytes};
-            msghdr header{};
-            header.msg_name = &from;
-            header.msg_namelen = sizeof from;
-            header.msg_iov = &part;
-            header.msg_iovlen = 1;
-            header.msg_control = control;
-            header.msg_controllen = sizeof control;
-            const auto got = ::recvmsg(socket_.get(), &header, MSG_DONTWAIT);
-            if (got < 0 && errno == EINTR) continue;
-            if (got < 0 && errno == ECONNREFUSED) {
-                set_up(false);
-                continue;
+        for (unsigned n = 0; n < datagrams_at_once; ++n) {
+            Datagram datagram;
+            if (!read(datagram)) {
+                if (errno == EINTR) continue;
+                if (errno == ECONNREFUSED) {  // of an earlier datagram
+                    set_up(false);
+                    continue;
+                }
+                count_lost(0, true);
+                return std::nullopt;
             }
-            lost_.fetch_add(drops_.update(socket_.get(), got < 0 ? 0 : 1, got < 0),
-                            std::memory_order_relaxed);
-            if (got < 0) return std::nullopt;
-            const auto now = link::monotonic_ns();
+            count_lost(1, false);
             set_up(true);
             if (options_.listen) {
-                remember(pack(from), now);
+                remember(datagram.sender, datagram.received_ns);
             }
-            if (got == 0) continue;
-            if ((header.msg_flags & MSG_TRUNC) != 0) {
+            const bool is_announcement = datagram.length == 0;
+            if (is_announcement) continue;
+            if (datagram.truncated) {
                 add(errors_);
                 continue;
             }
-            auto length = header_bytes + static_cast<std::size_t>(got);
-            for (; length < smallest_frame; ++length) {
-                frame_[length] = 0;
-            }
-            link::trace_frame(link::ethernet_received, {frame_.data(), length});
-            add(received_);
-            received_bytes_.fetch_add(length, std::memory_order_relaxed);
-            return Arrival{{frame_.data(), length}, std::min(time_of(header, now), now)};
+            return frame_of(datagram);
         }
         return std::nullopt;
     }
@@ -234,6 +219,61 @@ private:
         std::atomic<std::uint64_t> address{0};  ///< 0: none; written by the receiving thread
         std::atomic<std::int64_t> last_received_ns{0};
     };
+
+    /// Writes a time as eight bytes, the most significant first.
+    static void stamp(std::span<std::uint8_t> to, std::int64_t time_ns) noexcept {
+        auto rest = static_cast<std::uint64_t>(time_ns);
+        for (std::size_t i = 8; i-- > 0;) {
+            to[i] = static_cast<std::uint8_t>(rest);
+            rest >>= 8;
+        }
+    }
+
+    /// A datagram whose payload is behind the header in `frame_`.
+    struct Datagram {
+        std::size_t length = 0;
+        bool truncated = false;
+        std::uint64_t sender = 0;  ///< packed
+        std::int64_t received_ns = 0;
+        std::int64_t time_ns = 0;  ///< of the arrival, by the kernel
+    };
+    /// Reads a datagram. Returns false with the reason in errno.
+    bool read(Datagram& datagram) noexcept {
+        sockaddr_in from{};
+        alignas(cmsghdr) char control[CMSG_SPACE(sizeof(timespec))];
+        iovec payload{frame_.data() + header_bytes, frame_.size() - header_bytes};
+        msghdr header{};
+        header.msg_name = &from;
+        header.msg_namelen = sizeof from;
+        header.msg_iov = &payload;
+        header.msg_iovlen = 1;
+        header.msg_control = control;
+        header.msg_controllen = sizeof control;
+        const ssize_t length = ::recvmsg(socket_.get(), &header, MSG_DONTWAIT);
+        if (length < 0) return false;
+        datagram.length = static_cast<std::size_t>(length);
+        datagram.truncated = (header.msg_flags & MSG_TRUNC) != 0;
+        datagram.sender = pack(from);
+        datagram.received_ns = link::monotonic_ns();
+        datagram.time_ns = std::min(time_of(header, datagram.received_ns), datagram.received_ns);
+        return true;
+    }
+    void count_lost(std::size_t datagrams, bool drained) noexcept {
+        lost_.fetch_add(drops_.update(socket_.get(), datagrams, drained),
+                        std::memory_order_relaxed);
+    }
+    /// Pads the frame of a datagram with zeros to the smallest length, and counts it.
+    Arrival frame_of(const Datagram& datagram) noexcept {
+        const std::size_t end = header_bytes + datagram.length;
+        const std::size_t length = std::max(end, smallest_frame);
+        std::fill(frame_.begin() + static_cast<std::ptrdiff_t>(end),
+                  frame_.begin() + static_cast<std::ptrdiff_t>(length), std::uint8_t{0});
+        const std::span<const std::uint8_t> frame{frame_.data(), length};
+        link::trace_frame(link::ethernet_received, frame);
+        add(received_);
+        received_bytes_.fetch_add(length, std::memory_order_relaxed);
+        return Arrival{frame, datagram.time_ns};
+    }
 
     /// Derives the own address and the header of received frames. Frames of the listening end
     /// passed the devices there, which their source address shows (locally administered).
