@@ -147,9 +147,21 @@ Core::Condition Core::condition(const FaultEvent& event) const noexcept {
 void Core::cycle(std::int64_t grid_ns, std::int64_t due_ns, std::int64_t woke_ns) noexcept {
     const Current current(this);
     const Guard guard(!inputs_ || !inputs_->replays());
+    begin_cycle(grid_ns, due_ns, woke_ns);
+    apply_edits();
+    std::int64_t end_ns = woke_ns;
+    if (plan_) {
+        end_ns = execute_plan(due_ns, woke_ns);
+    } else {  // it has no outputs yet that a stop would make safe
+        halt_seen_.store(halt_asked_.load(std::memory_order_acquire), std::memory_order_release);
+    }
+    ++info_.number;
+    monitor.end_cycle(end_ns);
+}
+
+void Core::begin_cycle(std::int64_t grid_ns, std::int64_t due_ns, std::int64_t woke_ns) noexcept {
     grid_ns_ = grid_ns;
     info_.start_ns = due_ns;
-    std::int64_t end_ns = woke_ns;
     tracing_ = trace_.load(std::memory_order_acquire);
     if (measure_) {
         monitor.begin_cycle(due_ns, woke_ns);
@@ -159,38 +171,36 @@ void Core::cycle(std::int64_t grid_ns, std::int64_t due_ns, std::int64_t woke_ns
         inputs_->begin(CycleRecord::cycle, info_.number, grid_ns, due_ns, woke_ns,
                        monitor.missed());
     }
-    take_over();
-    if (plan_) {
-        import();
-        const bool ran = live();
-        if (ran) {
-            run();
-        }
-        if (measure_) {
-            store(*pins_.wakeup, pin_ns(woke_ns - due_ns));
-        }
-        end_ns = account(woke_ns, ran);
-        limiter_.flush(measure_ ? woke_ns : due_ns,
-                       [this](const FaultEvent& e) noexcept { faults_.push(e); });
-        output();
-        if (probes_ && (ran || !rows_end_.load(std::memory_order_relaxed))) {
-            sample_probes();
-        }
-        if (inputs_) {
-            end_record();
-        } else {
-            answer();
-        }
-        if (tracing_) [[unlikely]] {
-            tracing_->put(TraceEvent::cycle, woke_ns, monotonic_ns(), info_.number,
-                          static_cast<std::uint64_t>(std::max<std::int64_t>(woke_ns - due_ns, 0)));
-        }
-    } else {
-        // it has no outputs yet
-        halt_seen_.store(halt_asked_.load(std::memory_order_acquire), std::memory_order_release);
+}
+
+// A re-execution reads the journal in this order, too.
+std::int64_t Core::execute_plan(std::int64_t due_ns, std::int64_t woke_ns) noexcept {
+    import_values();
+    const bool ran = live();
+    if (ran) {
+        run();
     }
-    ++info_.number;
-    monitor.end_cycle(end_ns);
+    if (measure_) {
+        store(*pins_.wakeup, pin_ns(woke_ns - due_ns));
+    }
+    const std::int64_t end_ns = account(woke_ns, ran);
+    limiter_.flush(measure_ ? woke_ns : due_ns,
+                   [this](const FaultEvent& e) noexcept { faults_.push(e); });
+    publish_outputs();
+    if (probes_ && (ran || !rows_end_.load(std::memory_order_relaxed))) {
+        sample_probes();
+    }
+    if (inputs_) {
+        end_record();
+    } else {
+        answer_observation();
+    }
+    if (tracing_) [[unlikely]] {
+        const std::int64_t late_ns = std::max<std::int64_t>(woke_ns - due_ns, 0);
+        tracing_->put(TraceEvent::cycle, woke_ns, monotonic_ns(), info_.number,
+                      static_cast<std::uint64_t>(late_ns));
+    }
+    return end_ns;
 }
 
 void Core::service() noexcept {
@@ -201,7 +211,7 @@ void Core::service() noexcept {
         inputs_->begin(CycleRecord::service, info_.number, grid_ns_, info_.start_ns, monotonic_ns(),
                        monitor.missed());
     }
-    take_over();
+    apply_edits();
     // before running_ is read: who asks has stopped it before
     const std::uint64_t asked = halt_asked_.load(std::memory_order_acquire);
     bool acts = false;
@@ -214,14 +224,14 @@ void Core::service() noexcept {
     halt_seen_.store(asked, std::memory_order_release);
     if (!plan_) return;
     if (!inputs_) {
-        answer();
+        answer_observation();
     } else if (acts || plan_ != before || inputs_->replays() || observation_.load() ||
                applied_.load(std::memory_order_relaxed) != applied) {
         end_record();
     }
 }
 
-void Core::output() noexcept {
+void Core::publish_outputs() noexcept {
     int free = nobody;
     const bool mine = turn_.compare_exchange_strong(free, thread, std::memory_order_acq_rel);
     if (note(mine) == 0 || !mine) {
@@ -279,7 +289,7 @@ void Core::skip(std::uint64_t periods) noexcept {
 
 // The inbox first: a write that was queued before a plan was offered goes to the places of the plan
 // before it, and those places are gone once the new plan has been taken.
-void Core::take_over() noexcept {
+void Core::apply_edits() noexcept {
     plan::Plan* const offered = offered_plan();
     const bool replays = inputs_ && inputs_->replays();
     drain_writes(replays ? inputs_->record().writes_before : UINT64_MAX);
@@ -289,7 +299,7 @@ void Core::take_over() noexcept {
     if (offered) {
         TraceRing* const tracing = trace_.load(std::memory_order_acquire);
         const std::int64_t begin_ns = tracing ? monotonic_ns() : 0;
-        take(offered);
+        adopt(offered);
         if (tracing) {
             tracing->put(TraceEvent::plan, begin_ns, monotonic_ns(), info_.number, 0);
         }
@@ -326,7 +336,7 @@ bool Core::is_due(const plan::Plan& plan) noexcept {
     });
 }
 
-void Core::take(plan::Plan* plan) noexcept {
+void Core::adopt(plan::Plan* plan) noexcept {
     // the reasons may be those of a plugin that is unloaded next
     limiter_.clear([this](const FaultEvent& e) noexcept { faults_.push(e); });
     // All old places are read before any new one is written or rebound: a value may move within one
@@ -370,7 +380,7 @@ void Core::drain_writes(std::uint64_t until) noexcept {
     }
 }
 
-void Core::import() noexcept {
+void Core::import_values() noexcept {
     if (inputs_) {
         inputs_->reads(plan_->imports.size());
     }
@@ -380,13 +390,13 @@ void Core::import() noexcept {
     }
     for (plan::Import& from : plan_->imports) {
         if (is_other_plan) {
-            import(*from.channel, from.to, from.channel->published);
+            import_values(*from.channel, from.to, from.channel->published);
         } else if (!inputs_) {
-            import(*from.channel, from.to);
+            import_values(*from.channel, from.to);
         } else if (inputs_->replays()) {
-            import(*from.channel, from.to, inputs_->note(0));
+            import_values(*from.channel, from.to, inputs_->note(0));
         } else {
-            inputs_->note(import(*from.channel, from.to));
+            inputs_->note(import_values(*from.channel, from.to));
         }
     }
     for (const plan::CellImport& from : plan_->cell_imports) {
@@ -396,7 +406,8 @@ void Core::import() noexcept {
 }
 
 /// Returns which finished cycle of the writer was taken; 0: none is newer than the last one.
-std::uint64_t Core::import(plan::Channel& channel, const std::vector<hal_value*>& to) noexcept {
+std::uint64_t Core::import_values(plan::Channel& channel,
+                                  const std::vector<hal_value*>& to) noexcept {
     if (!(channel.middle.load(std::memory_order_acquire) & plan::Channel::fresh)) return 0;
     channel.front = channel.middle.exchange(channel.front, std::memory_order_acq_rel) & 3;
     const hal_value* values = channel.buffers[channel.front].get();
@@ -407,8 +418,8 @@ std::uint64_t Core::import(plan::Channel& channel, const std::vector<hal_value*>
 }
 
 /// Takes the finished cycle that the journaled one took; 0: none.
-void Core::import(plan::Channel& channel, const std::vector<hal_value*>& to,
-                  std::uint64_t sequence) noexcept {
+void Core::import_values(plan::Channel& channel, const std::vector<hal_value*>& to,
+                         std::uint64_t sequence) noexcept {
     if (sequence == 0 || !channel.history) return;
     auto& entries = channel.history->entries;
     while (!entries.empty() && entries.front().first < sequence) {
@@ -441,7 +452,7 @@ void Core::publish(plan::Plan& plan) noexcept {
 }
 
 /// Returns false when nobody asked.
-bool Core::answer() noexcept {
+bool Core::answer_observation() noexcept {
     const bool replays = inputs_ && inputs_->replays();
     if (replays && inputs_->record().observation == 0) return false;
     Observation* const request = observation_.exchange(nullptr, std::memory_order_acq_rel);
@@ -461,7 +472,7 @@ bool Core::answer() noexcept {
 
 void Core::end_record() noexcept {
     const std::uint64_t sum = checksum();
-    answer();
+    answer_observation();
     if (inputs_->replays()) {
         drain_writes(inputs_->record().writes_after);
     }
@@ -723,7 +734,7 @@ void Core::stop_at(hal_fault_code code, const char* reason) noexcept {
     check_modes(current_function());
     board_.begin(this, &stopped_);
     raise({code, current_function(), info_.number, info_.start_ns, 0.0, reason, nullptr});
-    stopped_.store(true, std::memory_order_release);  // output() makes the outputs safe
+    stopped_.store(true, std::memory_order_release);  // publish_outputs() makes the outputs safe
 }
 
 /// `row` is one that begins at or before `first`; left at one that begins at or before `last`.

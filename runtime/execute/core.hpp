@@ -255,15 +255,22 @@ public:
     void note_trap() noexcept { modes_.note_trap(); }
 
 private:
-    void take_over() noexcept;
+    void begin_cycle(std::int64_t grid_ns, std::int64_t due_ns, std::int64_t woke_ns) noexcept;
+    /// Imports, runs the functions unless the machine or the thread is stopped, publishes, and
+    /// answers the session. Returns when the functions ended.
+    std::int64_t execute_plan(std::int64_t due_ns, std::int64_t woke_ns) noexcept;
+    /// Applies queued writes, an offered plan and offered probes.
+    void apply_edits() noexcept;
     static bool is_due(const plan::Plan& plan) noexcept;
-    void take(plan::Plan* plan) noexcept;
+    /// Makes the plan the one that the cycles run, with the values and the state of the one before.
+    void adopt(plan::Plan* plan) noexcept;
     plan::Plan* offered_plan() noexcept;
     void drain_writes(std::uint64_t until = UINT64_MAX) noexcept;
-    void import() noexcept;
-    std::uint64_t import(plan::Channel& channel, const std::vector<hal_value*>& to) noexcept;
-    void import(plan::Channel& channel, const std::vector<hal_value*>& to,
-                std::uint64_t sequence) noexcept;
+    /// Copies what other threads have published.
+    void import_values() noexcept;
+    std::uint64_t import_values(plan::Channel& channel, const std::vector<hal_value*>& to) noexcept;
+    void import_values(plan::Channel& channel, const std::vector<hal_value*>& to,
+                       std::uint64_t sequence) noexcept;
     std::int64_t clock_ns() noexcept;
     std::int64_t unnoted_clock_ns() noexcept;
     std::uint64_t note(std::uint64_t value) noexcept {
@@ -275,10 +282,13 @@ private:
     std::uint64_t checksum() const noexcept;
     void keep_history() noexcept;
     static void publish(plan::Plan& plan) noexcept;
-    void output() noexcept;
-    bool answer() noexcept;
+    /// Publishes for other threads; of a stopped thread the safe values. Confirms a stop.
+    void publish_outputs() noexcept;
+    /// Copies the values that the session asked for.
+    bool answer_observation() noexcept;
     void take_probes() noexcept;
     void sample_probes() noexcept;
+    /// Whether functions are to run; in a re-execution as in the journal.
     bool live() noexcept {
         return note(running_.load(std::memory_order_acquire) &&
                     !stopped_.load(std::memory_order_relaxed)) != 0;

@@ -227,17 +227,17 @@ void Supervisor::work() {
         const std::int64_t now = monotonic_ns();
         const std::int64_t gap = now - looked_ns_ - interval;
 
-        const std::int64_t slept = asleep();
+        const std::int64_t asleep_now = asleep();
         if (gap > max_interval_ns / 2) {
             gap_ns_ = gap;
             gap_end_ns_ = now;
         }
         looked_ns_ = now;
-        if (look(now, gap, slept - asleep_before)) {
+        if (look(now, gap, asleep_now - asleep_before)) {
             __atomic_fetch_add(&shared.progress, 1, __ATOMIC_RELEASE);
             feed_watchdog(now);
         }
-        asleep_before = slept;
+        asleep_before = asleep_now;
     }
 }
 
@@ -254,35 +254,53 @@ bool Supervisor::look(std::int64_t now_ns, std::int64_t gap_ns, std::int64_t sus
     for (Watched& one : watched_) {
         Core& core = *one.core;
         core.sample();
-        if (core.monitor.hung()) {  // what it goes on writing does not last
-            core.stand_in(now_ns, false);
+        switch (assess(one, now_ns, gap_ns, suspended_ns)) {
+        case Health::hung:
+            core.stand_in(now_ns, false);  // what it goes on writing does not last
             look_at_late(one);
             if (one.starved && uses_cpu(one)) {
                 declare_busy(one, now_ns);
             }
             well = false;
-            continue;
-        }
-        const std::int64_t limit = core.monitor.supervise_ns;
-        if (limit == 0) continue;
-        const std::int64_t silent = now_ns - core.monitor.overdue_since_ns();
-        if (suspended_ns <= limit && silent > limit && behind_hog(one, now_ns)) continue;
-        if (silent > limit && suspended_ns <= limit && in_gap(one, now_ns, gap_ns)) {
-            core.monitor.excuse(now_ns);  // the thread counts the gap when it has the CPU again
-        } else if (silent > limit || suspended_ns > limit) {
+            break;
+        case Health::silent:
             declare(one, now_ns, gap_ns, suspended_ns);
             well = false;
-        } else if (silent > limit / 4) {
-            look_at_late(one);
-        } else {
-            one.mark = {};
-            one.blocked = false;
-            if (now_ns - one.usage.taken_ns > usage_interval_ns) {
-                one.usage = scheduler_usage(one.tid);
-            }
+            break;
+        case Health::in_gap:
+            core.monitor.excuse(now_ns);  // the thread counts the gap when it has the CPU again
+            break;
+        case Health::late: look_at_late(one); break;
+        case Health::in_time: begin_anew(one, now_ns); break;
+        case Health::unsupervised:
+        case Health::behind_hog: break;
         }
     }
     return well;
+}
+
+Supervisor::Health Supervisor::assess(const Watched& watched, std::int64_t now_ns,
+                                      std::int64_t gap_ns, std::int64_t suspended_ns) const {
+    const CycleMonitor& monitor = watched.core->monitor;
+    if (monitor.hung()) return Health::hung;
+    const std::int64_t limit_ns = monitor.supervise_ns;
+    if (limit_ns == 0) return Health::unsupervised;
+    if (suspended_ns > limit_ns) return Health::silent;
+    const std::int64_t silent_ns = now_ns - monitor.overdue_since_ns();
+    if (silent_ns > limit_ns) {
+        if (behind_hog(watched, now_ns)) return Health::behind_hog;
+        if (in_gap(watched, now_ns, gap_ns)) return Health::in_gap;
+        return Health::silent;
+    }
+    return silent_ns > limit_ns / 4 ? Health::late : Health::in_time;
+}
+
+void Supervisor::begin_anew(Watched& watched, std::int64_t now_ns) noexcept {
+    watched.mark = {};
+    watched.blocked = false;
+    if (now_ns - watched.usage.taken_ns > usage_interval_ns) {
+        watched.usage = scheduler_usage(watched.tid);
+    }
 }
 
 // A thread of higher priority occupies its CPU and is about to be declared hung itself, which frees

@@ -110,7 +110,21 @@ private:
         SchedulerUsage usage{};
     };
     void work();
+    /// What a look at a thread finds.
+    enum class Health {
+        unsupervised,  ///< it has no limit
+        in_time,
+        late,  ///< by more than a quarter of its limit
+        behind_hog,  ///< beyond its limit, as is the thread that occupies its CPU
+        in_gap,  ///< beyond its limit, without the CPU for a time that it tolerates
+        silent,  ///< beyond its limit, or the computer slept for longer
+        hung,  ///< declared silent before
+    };
     bool look(std::int64_t now_ns, std::int64_t gap_ns, std::int64_t suspended_ns);
+    Health assess(const Watched& watched, std::int64_t now_ns, std::int64_t gap_ns,
+                  std::int64_t suspended_ns) const;
+    /// Forgets what was seen of a cycle that was late.
+    static void begin_anew(Watched& watched, std::int64_t now_ns) noexcept;
     bool behind_hog(const Watched& watched, std::int64_t now_ns) const;
     bool in_gap(const Watched& watched, std::int64_t now_ns, std::int64_t gap_ns) const;
     void declare(Watched& watched, std::int64_t now_ns, std::int64_t gap_ns,
