@@ -367,7 +367,8 @@ public:
           plugin_(*component.plugin),
           singleton_(plugin_.flags & HAL_COMPONENT_SINGLETON) {}
 
-    /// False after reporting.
+    /// Makes the first instance, whose arguments tell the number if the line does not, then the
+    /// others. False after reporting.
     bool make() {
         if (singleton_ && (request_.names.size() > 1 || request_.count > 1)) {
             diagnostics_.error("bad-argument",
@@ -376,31 +377,12 @@ public:
             return false;
         }
         const std::optional<std::size_t> given = given_count();
-        new_block(std::max<std::size_t>(given.value_or(1), 1));
-        std::optional<std::size_t> total = given;
-        for (std::size_t i = 0; !total || i < *total; ++i) {
-            auto instance = new_instance(i);
-            const std::string serial = name(*instance, i);
-            const std::string personality = personality_of(i);
-            Construction c{model_, request_, *instance, i, personality};
-            c.serial = serial;
-            if (!construct_one(edit_, component_, request_, sources_, diagnostics_,
-                               std::move(instance), c)) {
-                return false;
-            }
-            if (i > 0) continue;
-            if (!all_known(component_, request_, c.asked, diagnostics_)) return false;
-            if (given && !fits_lists(c, *given)) return false;
-            if (!total) {
-                total = declared_count(c);
-            }
-            note_short_lists(c, *total);
-            if (*total > 1) {
-                if (!given) {
-                    new_block(*total - 1);
-                }
-                make_room(model_, *component_.instances.back(), *total - 1);
-            }
+        if (given == std::size_t{0}) return true;
+        new_block(given.value_or(1));
+        const std::optional<std::size_t> total = make_first(given);
+        if (!total) return false;
+        for (std::size_t i = 1; i < *total; ++i) {
+            if (!make_one(i, [](const Construction&) { return true; })) return false;
         }
         return true;
     }
@@ -412,6 +394,38 @@ private:
         if (!request_.names.empty()) return request_.names.size();
         if (request_.count < 0) return std::nullopt;
         return static_cast<std::size_t>(request_.count);
+    }
+
+    /// Returns the number of instances, for which there is memory then; nothing after reporting.
+    std::optional<std::size_t> make_first(std::optional<std::size_t> given) {
+        std::size_t total = 0;
+        const bool made = make_one(0, [&](const Construction& first) {
+            if (!all_known(component_, request_, first.asked, diagnostics_)) return false;
+            if (given && !fits_lists(first, *given)) return false;
+            total = given.value_or(declared_count(first));
+            note_short_lists(first, total);
+            return true;
+        });
+        if (!made) return std::nullopt;
+        if (total > 1) {
+            if (!given) {
+                new_block(total - 1);
+            }
+            make_room(model_, *component_.instances.back(), total - 1);
+        }
+        return total;
+    }
+    /// Makes an instance. `accept` checks what it has declared. False after reporting.
+    template <class Accept>
+    bool make_one(std::size_t i, Accept accept) {
+        auto instance = new_instance(i);
+        const std::string serial = name(*instance, i);
+        const std::string personality = personality_of(i);
+        Construction c{model_, request_, *instance, i, personality};
+        c.serial = serial;
+        return construct_one(edit_, component_, request_, sources_, diagnostics_,
+                             std::move(instance), c) &&
+               accept(c);
     }
 
     std::size_t declared_count(const Construction& first) const {
