@@ -82,7 +82,7 @@ private:
             }
         }
         after_comment_ = false;
-        if (continued && long_command(words, remark)) return;
+        if (continued && write_with_breaks(words, remark)) return;
         const std::string kind(words.size() > 1 && words[1] == "=" ? words[1] : words[0]);
         if (kind != kind_) {
             flush();
@@ -145,35 +145,13 @@ private:
         return at;
     }
 
-    /// A command that would be too long on one line keeps the line breaks its user gave it. False:
-    /// it fits, or has none.
-    bool long_command(const std::vector<std::string_view>& words, const std::string& remark) {
-        std::size_t total = 0;
-        for (const std::string_view word : words) {
-            total += width(word) + 1;
-        }
-        if (total - 1 <= line_width) return false;
-        std::string text;
-        std::uint32_t end = 0;
-        bool broken = false;  // a line may also end inside a word, which is then joined
-        for (const std::string_view word : words) {
-            const auto at = static_cast<std::size_t>(word.data() - line_.text().data());
-            const Span span = line_.span(at, at + word.size());
-            const std::string_view between =
-                text.empty() ? "" : sources_.text({source_, end, span.begin});
-            const bool here = between.find('\n') != between.npos;
-            if (here) {
-                text += " \\\n    ";
-            } else if (text.empty()) {
-                text += "";
-            } else {
-                text += " ";
-            }
-            text += word;
-            end = span.end;
-            broken = broken || here;
-        }
-        if (!broken) return false;
+    /// Writes a command that is too long for one line with the line breaks that its user gave it.
+    /// Returns false, and writes nothing, for one that fits or has none.
+    bool write_with_breaks(const std::vector<std::string_view>& words, const std::string& remark) {
+        if (joined_width(words) <= line_width) return false;
+        const std::string text = with_breaks(words);
+        const bool has_breaks = text.find('\n') != text.npos;
+        if (!has_breaks) return false;
         flush();
         begin_line();
         out_ += text;
@@ -182,6 +160,31 @@ private:
         }
         end_line(remark);
         return true;
+    }
+    static std::size_t joined_width(const std::vector<std::string_view>& words) {
+        std::size_t total = words.size() - 1;  // the blanks between them
+        for (const std::string_view word : words) {
+            total += width(word);
+        }
+        return total;
+    }
+    /// The words of the line, with a break where the source has one between two of them. A break
+    /// inside a word joins its parts.
+    std::string with_breaks(const std::vector<std::string_view>& words) const {
+        std::string text;
+        std::uint32_t previous_end = 0;
+        for (const std::string_view word : words) {
+            const auto at = static_cast<std::size_t>(word.data() - line_.text().data());
+            const Span span = line_.span(at, at + word.size());
+            if (!text.empty()) {
+                const std::string_view gap = sources_.text({source_, previous_end, span.begin});
+                const bool is_broken = gap.find('\n') != gap.npos;
+                text += is_broken ? " \\\n    " : " ";
+            }
+            text += word;
+            previous_end = span.end;
+        }
+        return text;
     }
 
     /// Words grouped into columns. The first column is the command, the last one is never padded.
@@ -215,44 +218,57 @@ private:
 
     /// Writes the block of equal commands met so far, its columns aligned.
     void flush() {
-        std::vector<std::size_t> widths;
-        std::size_t before_comment = 0;
-        for (const Row& row : rows_) {
-            for (std::size_t i = 0; i + 1 < row.cells.size(); ++i) {
-                if (widths.size() <= i) {
-                    widths.push_back(0);
-                }
-                if (const std::size_t cell = width(row.cells[i]); cell <= widest_cell) {
-                    widths[i] = std::max(widths[i], cell);
-                }
-            }
-        }
+        const std::vector<std::size_t> widths = column_widths(rows_);
         std::vector<std::string> lines;
+        std::size_t comment_column = 0;
         for (const Row& row : rows_) {
-            std::string text;
-            for (std::size_t i = 0; i < row.cells.size(); ++i) {
-                text += row.cells[i];
-                if (i + 1 == row.cells.size()) break;
-                const std::size_t cell = width(row.cells[i]);
-                text.append(cell < widths[i] ? widths[i] - cell : 0, ' ');
-                text += ' ';
+            lines.push_back(aligned(row.cells, widths));
+            const std::size_t length = width(lines.back());
+            if (!row.comment.empty() && length <= line_width) {
+                comment_column = std::max(comment_column, length);
             }
-            if (const std::size_t whole = width(text);
-                !row.comment.empty() && whole <= line_width) {
-                before_comment = std::max(before_comment, whole);
-            }
-            lines.push_back(std::move(text));
         }
         for (std::size_t i = 0; i < rows_.size(); ++i) {
             begin_line();
             out_ += lines[i];
             if (!rows_[i].comment.empty()) {
-                const std::size_t whole = width(lines[i]);
-                out_.append((whole < before_comment ? before_comment - whole : 0) + 2, ' ');
+                pad(out_, width(lines[i]), comment_column);
+                out_ += "  ";
             }
             end_line(rows_[i].comment);
         }
         rows_.clear();
+    }
+    /// The last cell of a row has no column, and a cell that is too wide does not widen its own.
+    static std::vector<std::size_t> column_widths(const std::vector<Row>& rows) {
+        std::vector<std::size_t> widths;
+        for (const Row& row : rows) {
+            for (std::size_t i = 0; i + 1 < row.cells.size(); ++i) {
+                if (widths.size() <= i) {
+                    widths.push_back(0);
+                }
+                const std::size_t cell = width(row.cells[i]);
+                if (cell <= widest_cell) {
+                    widths[i] = std::max(widths[i], cell);
+                }
+            }
+        }
+        return widths;
+    }
+    static std::string aligned(const Cells& cells, const std::vector<std::size_t>& widths) {
+        std::string text;
+        for (std::size_t i = 0; i + 1 < cells.size(); ++i) {
+            text += cells[i];
+            pad(text, width(cells[i]), widths[i]);
+            text += ' ';
+        }
+        return text + cells.back();
+    }
+    /// Appends blanks to what is `length` wide.
+    static void pad(std::string& text, std::size_t length, std::size_t column) {
+        if (length < column) {
+            text.append(column - length, ' ');
+        }
     }
 
     /// Blank lines that stood here: none at the start of the text, at most two in a row.
