@@ -276,36 +276,72 @@ private:
         return text == "@mantissa" ? mantissa : exponent;
     }
 
-    /// `param NAME OBJECT/BITS [*FACTOR] [for=CHANNEL] [WORD=VALUE[;SETTING=NUMBER...]...]`
-    void parameter(const Words& words) {
-        const std::string name = with_step(words[1]);
-        const auto given = parameters_.find(name);
-        if (given == parameters_.end()) return;
+    /// A line `param NAME OBJECT/BITS [*FACTOR] [for=CHANNEL] [WORD=VALUE[;SETTING=NUMBER...]...]`.
+    /// Without words the value of the modParam is a number; each SETTING changes CHANNEL.
+    struct ParameterLine {
+        struct Choice {
+            std::string word;
+            std::string value;
+            Words settings;
+        };
+        std::string name;
+        std::string object;
         double factor = 1;
-        Words values;
-        std::string target;
+        std::string channel;
+        std::vector<Choice> choices;
+    };
+    ParameterLine parameter_line(const Words& words) const {
+        ParameterLine line;
+        line.name = with_step(words[1]);
+        line.object = words[2];
         for (std::size_t i = 3; i < words.size(); ++i) {
             if (words[i].starts_with('*')) {
-                factor = std::strtod(words[i].c_str() + 1, nullptr);
+                line.factor = std::strtod(words[i].c_str() + 1, nullptr);
             } else if (words[i].starts_with("for=")) {
-                target = with_step(words[i].substr(4));
+                line.channel = with_step(words[i].substr(4));
             } else {
-                const Words more = split(words[i], ',');
-                values.insert(values.end(), more.begin(), more.end());
+                for (const std::string& text : split(words[i], ',')) {
+                    line.choices.push_back(choice(text));
+                }
             }
         }
-        if (values.empty()) return write_number(name, words[2], given->second, factor);
+        return line;
+    }
+    /// `WORD=VALUE[;SETTING=NUMBER...]`
+    static ParameterLine::Choice choice(const std::string& text) {
+        const std::size_t equals = text.find('=');
+        Words parts = split(text.substr(equals + 1), ';');
+        ParameterLine::Choice made;
+        made.word = text.substr(0, equals);
+        made.value = parts[0];
+        made.settings.assign(parts.begin() + 1, parts.end());
+        return made;
+    }
+    /// Writes the object of a `param` line if the user's file has the modParam.
+    void parameter(const Words& words) {
+        const ParameterLine line = parameter_line(words);
+        const auto given = parameters_.find(line.name);
+        if (given == parameters_.end()) return;
+        const std::string& value = given->second;
+        if (line.choices.empty()) {
+            write_number(line.name, line.object, value, line.factor);
+            return;
+        }
+        const auto chosen = std::ranges::find_if(
+            line.choices, [&](const auto& choice) { return same_word(choice.word, value); });
+        if (chosen == line.choices.end()) {
+            report_unknown_choice(line, value);
+            return;
+        }
+        apply_effects(line.channel, chosen->settings, 0);
+        write(line.object, std::atoll(chosen->value.c_str()));
+    }
+    void report_unknown_choice(const ParameterLine& line, const std::string& value) {
         Words known;
-        for (const std::string& value : values) {
-            const std::string word = value.substr(0, value.find('='));
-            known.push_back(word);
-            if (same_word(word, given->second)) {
-                const Words parts = split(value.substr(value.find('=') + 1), ';');
-                apply_effects(target, parts, 1);
-                return write(words[2], std::atoll(parts[0].c_str()));
-            }
+        for (const ParameterLine::Choice& choice : line.choices) {
+            known.push_back(choice.word);
         }
-        problems_.push_back("invalid value '" + given->second + "' of modParam '" + name +
+        problems_.push_back("invalid value '" + value + "' of modParam '" + line.name +
                             "': expected " + bus::choice_form(known).expected);
     }
     void write_number(const std::string& name, const std::string& object, const std::string& text,

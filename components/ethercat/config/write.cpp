@@ -151,22 +151,41 @@ std::string modes(const Found& s, unsigned axes) {
     return text;
 }
 
-/// Returns how many entries each of several assigned PDOs with consecutive numbers has; 0: they
-/// differ, or there is at most one.
-std::size_t entries_each(const std::vector<sii::Pdo>& pdos, std::size_t& max) {
+std::vector<const sii::Pdo*> assigned(const std::vector<sii::Pdo>& pdos) {
     std::vector<const sii::Pdo*> assigned;
     for (const sii::Pdo& p : pdos) {
         if (p.sync_manager != 0xff) {
             assigned.push_back(&p);
         }
     }
-    bool equal = assigned.size() > 1;
-    for (std::size_t i = 0; i < assigned.size(); ++i) {
-        max = std::max(max, assigned[i]->entries.size());
-        equal = equal && assigned[i]->entries.size() == assigned[0]->entries.size() &&
-                assigned[i]->index == assigned[0]->index + i;
+    return assigned;
+}
+
+/// Returns how many entries each of several assigned PDOs with consecutive numbers has; 0: they
+/// differ, or there is at most one.
+std::size_t common_entry_count(const std::vector<const sii::Pdo*>& pdos) {
+    if (pdos.size() < 2) return 0;
+    const std::size_t count = pdos.front()->entries.size();
+    for (std::size_t i = 0; i < pdos.size(); ++i) {
+        const bool is_consecutive = pdos[i]->index == pdos.front()->index + i;
+        if (!is_consecutive || pdos[i]->entries.size() != count) return 0;
     }
-    return equal ? assigned[0]->entries.size() : 0;
+    return count;
+}
+
+/// Returns the length of the PDOs of a slave with a fixed assignment, which keeps it; 0: it has
+/// none, or a PDO of the other direction is longer.
+std::size_t fixed_entry_count(const Found& s) {
+    const auto rx = assigned(s.rx);
+    const auto tx = assigned(s.tx);
+    std::size_t longest = 0;
+    for (const auto* pdos : {&rx, &tx}) {
+        for (const sii::Pdo* const pdo : *pdos) {
+            longest = std::max(longest, pdo->entries.size());
+        }
+    }
+    const std::size_t common = std::max(common_entry_count(rx), common_entry_count(tx));
+    return common == longest ? common : 0;
 }
 
 std::string one_line(const std::string& text) {
@@ -177,59 +196,85 @@ std::string one_line(const std::string& text) {
     return out;
 }
 
+std::string cycle_text(std::int64_t cycle_ns) {
+    if (cycle_ns % 1'000'000 == 0) return std::to_string(cycle_ns / 1'000'000) + "ms";
+    return std::to_string(cycle_ns / 1000) + "us";
+}
+
+/// What identifies the slave: the keys that are known.
+std::string identity_keys(const Found& s) {
+    const bool has_esi = !s.esi.empty();
+    std::string text;
+    if (has_esi) {
+        text += "esi      = " + s.esi + "\n";
+    }
+    if (!s.order.empty()) {
+        text += "device   = " + s.order + "\n";
+    }
+    if (s.vendor != 0) {
+        text += "vendor   = " + hex(s.vendor) + "\n";
+    }
+    if (s.product != 0) {
+        text += "product  = " + hex(s.product) + "\n";
+    }
+    if (has_esi || s.revision != 0) {
+        text += "revision = " + hex(s.revision) + "+  # or a higher one\n";
+    }
+    return text;
+}
+
+/// The process data of a slave without an ESI, from its own memory.
+std::string process_data(const Found& s) {
+    const unsigned axes = axes_of(s);
+    std::string text;
+    if (axes != 0) {
+        text += "device  = cia402\n";
+    }
+    if (axes > 1) {
+        text += "axes    = " + std::to_string(axes) + "\n";
+    }
+    std::string options;
+    text += objects("outputs", s.rx, axes, options);
+    text += objects("inputs", s.tx, axes, options);
+    text += options + modes(s, axes);
+    if (const std::size_t count = fixed_entry_count(s); count != 0) {
+        text += "entries-per-pdo = " + std::to_string(count) + "\n";
+    }
+    return text;
+}
+
+/// Names of slaves: that of the EEPROM, with the position if it is missing or not the first one.
+class SlaveNames {
+public:
+    std::string name_of(const Found& s, std::size_t position) {
+        const std::string number = std::to_string(position);
+        std::string name = dashed(s.name);
+        if (name.empty()) {
+            name = "slave-" + number;
+        }
+        const bool is_first = used_.insert(name).second;
+        return is_first ? name : name + "-" + number;
+    }
+
+private:
+    std::set<std::string> used_;
+};
+
 }  // namespace
 
 std::string write(const std::string& link, std::int64_t cycle_ns,
                   const std::vector<Found>& slaves) {
-    std::string out = "[bus]\nlink  = " + link + "\ncycle = " +
-                      (cycle_ns % 1'000'000 == 0 ? std::to_string(cycle_ns / 1'000'000) + "ms\n"
-                                                 : std::to_string(cycle_ns / 1000) + "us\n");
-    std::map<std::string, unsigned> names;
+    std::string out = "[bus]\nlink  = " + link + "\ncycle = " + cycle_text(cycle_ns) + "\n";
+    SlaveNames names;
     for (std::size_t i = 0; i < slaves.size(); ++i) {
         const Found& s = slaves[i];
-        std::string name = dashed(s.name);
-        if (name.empty()) {
-            name = "slave-" + std::to_string(i);
+        out += "\n[slave " + std::to_string(i) + " " + names.name_of(s, i) + "]";
+        if (!s.device.empty()) {
+            out += "  # " + one_line(s.device);
         }
-        if (const unsigned n = names[name]++; n != 0) {
-            name += "-" + std::to_string(i);
-        }
-        out += "\n[slave " + std::to_string(i) + " " + name + "]" +
-               (s.device.empty() ? "" : "  # " + one_line(s.device)) + "\n";
-        if (!s.esi.empty()) {
-            out += "esi      = " + s.esi + "\n";
-        }
-        if (!s.order.empty()) {
-            out += "device   = " + s.order + "\n";
-        }
-        if (s.vendor != 0) {
-            out += "vendor   = " + hex(s.vendor) + "\n";
-        }
-        const bool described = !s.esi.empty();
-        if (s.product != 0) {
-            out += "product  = " + hex(s.product) + "\n";
-        }
-        if (described || s.revision != 0) {
-            out += "revision = " + hex(s.revision) + "+  # or a higher one\n";
-        }
-        if (!described) {
-            const unsigned axes = axes_of(s);
-            if (axes != 0) {
-                out += "device  = cia402\n";
-            }
-            if (axes > 1) {
-                out += "axes    = " + std::to_string(axes) + "\n";
-            }
-            std::string options;
-            const std::string outputs = objects("outputs", s.rx, axes, options);
-
-            const std::string inputs = objects("inputs", s.tx, axes, options);
-            out += outputs + inputs + options + modes(s, axes);
-            std::size_t max = 0;  // a slave with a fixed assignment keeps it
-            const std::size_t each = std::max(entries_each(s.rx, max), entries_each(s.tx, max));
-            if (each != 0 && max == each) {
-                out += "entries-per-pdo = " + std::to_string(each) + "\n";
-            }
+        out += "\n" + identity_keys(s);
+        if (s.esi.empty()) {
+            out += process_data(s);
         }
         if (s.assign_activate != 0) {
             out += "dc = sync0\nassign-activate = " + hex(s.assign_activate) + "\n";

@@ -40,61 +40,97 @@ void LineOnSegments::Side::arrived(std::span<std::uint8_t> frame,
     }
 }
 
-namespace serve_facts {
+namespace {
+
 constexpr std::int64_t tick_ns = 1'000'000;
+constexpr std::int64_t poll_ns = 20'000;
 constexpr std::size_t frames_at_once = 32;
-}  // namespace serve_facts
+
+/// Works a line on one or two ports.
+class LineServer {
+public:
+    LineServer(Line& line, ethernet::Port& primary, ethernet::Port* secondary,
+               ServeControl* control) noexcept
+        : line_(line), ports_{&primary, secondary}, control_(control) {}
+
+    void run(const std::atomic<bool>& stop) noexcept {
+        std::int64_t next_tick_ns = 0;
+        while (!stop.load(std::memory_order_relaxed)) {
+            bool received = false;
+            for (const End end : {End::primary, End::secondary}) {
+                received = pass_frames(end) || received;
+            }
+            const std::int64_t now = link::monotonic_ns();
+            if (now >= next_tick_ns) {
+                tick(now);
+                next_tick_ns = now + tick_ns;
+            }
+            if (!received) {
+                wait(now, next_tick_ns);
+            }
+        }
+    }
+
+private:
+    ethernet::Port* port(End end) const noexcept { return ports_[static_cast<std::size_t>(end)]; }
+
+    /// Sends the frames that have arrived at one end through the line. Returns whether there were
+    /// any.
+    bool pass_frames(End end) noexcept {
+        if (port(end) == nullptr) return false;
+        for (std::size_t n = 0; n < frames_at_once; ++n) {
+            const auto arrival = port(end)->receive(link::monotonic_ns());
+            if (!arrival) return n > 0;
+            pass(*arrival, end);
+        }
+        return true;
+    }
+    void pass(const ethernet::Arrival& arrival, End end) noexcept {
+        const std::size_t length = std::min(arrival.bytes.size(), frame_.size());
+        std::memcpy(frame_.data(), arrival.bytes.data(), length);
+        // The stamp of the kernel is free of the latency of this thread.
+        const std::int64_t now = link::monotonic_ns();
+        const std::int64_t first_bit_ns = std::clamp(arrival.time_ns, now - tick_ns, now);
+        const Line::Passage out = line_.process({frame_.data(), length}, end, first_bit_ns);
+        ethernet::Port* const leaving = port(out.end);
+        if (out.lost || leaving == nullptr) return;
+        for (unsigned copy = 0; copy < out.copies; ++copy) {
+            leaving->send({frame_.data(), length}, {}, now);
+        }
+    }
+    void tick(std::int64_t now) noexcept {
+        line_.advance(now);
+        for (const End end : {End::primary, End::secondary}) {
+            if (port(end) == nullptr) continue;
+            bool& was_up = up_[static_cast<std::size_t>(end)];
+            const bool is_up = port(end)->statistics().up;
+            if (is_up != was_up) {
+                line_.set_cable(end, is_up);
+            }
+            was_up = is_up;
+        }
+        if (control_ != nullptr) {
+            control_->work(line_, now);
+        }
+    }
+    /// Waits for a frame at the first port. The second one is polled meanwhile.
+    void wait(std::int64_t now, std::int64_t until_ns) noexcept {
+        const bool has_two = port(End::secondary) != nullptr;
+        port(End::primary)->wait(has_two ? std::min(until_ns, now + poll_ns) : until_ns);
+    }
+
+    Line& line_;
+    std::array<ethernet::Port*, 2> ports_;
+    ServeControl* control_;
+    std::array<bool, 2> up_{true, true};
+    std::array<std::uint8_t, ethernet::max_frame> frame_;
+};
+
+}  // namespace
 
 void serve(Line& line, ethernet::Port& primary, ethernet::Port* secondary,
            const std::atomic<bool>& stop, ServeControl* control) noexcept {
-    const std::array<ethernet::Port*, 2> both{&primary, secondary};
-    std::array<std::uint8_t, ethernet::max_frame> frame;
-    std::array<bool, 2> up{true, true};
-    std::int64_t tick = 0;
-    while (!stop.load(std::memory_order_relaxed)) {
-        bool worked = false;
-        for (std::size_t side = 0; side < both.size(); ++side) {
-            if (both[side] == nullptr) continue;
-            for (std::size_t i = 0; i < serve_facts::frames_at_once; ++i) {
-                const auto arrival = both[side]->receive(link::monotonic_ns());
-                if (!arrival) break;
-                worked = true;
-                const std::size_t length = std::min(arrival->bytes.size(), frame.size());
-                std::memcpy(frame.data(), arrival->bytes.data(), length);
-                // The stamp of the kernel is free of the latency of this thread.
-                const std::int64_t now = link::monotonic_ns();
-                const std::int64_t first_bit_ns =
-                    std::clamp(arrival->time_ns, now - serve_facts::tick_ns, now);
-                const auto out =
-                    line.process({frame.data(), length}, static_cast<End>(side), first_bit_ns);
-                ethernet::Port* port = both[static_cast<std::size_t>(out.end)];
-                if (out.lost || port == nullptr) continue;
-                for (unsigned copy = 0; copy < out.copies; ++copy) {
-                    port->send({frame.data(), length}, {}, now);
-                }
-            }
-        }
-        const std::int64_t now = link::monotonic_ns();
-        if (now >= tick) {
-            line.advance(now);
-            for (std::size_t side = 0; side < both.size(); ++side) {
-                if (both[side] == nullptr) continue;
-                const bool is_up = both[side]->statistics().up;
-                if (is_up != up[side]) {
-                    line.set_cable(static_cast<End>(side), is_up);
-                }
-                up[side] = is_up;
-            }
-            if (control != nullptr) {
-                control->work(line, now);
-            }
-            tick = now + serve_facts::tick_ns;
-        }
-        if (worked) continue;
-        // With two ports one is polled while the other waits.
-        const std::int64_t until = secondary == nullptr ? tick : std::min(tick, now + 20'000);
-        primary.wait(until);
-    }
+    LineServer(line, primary, secondary, control).run(stop);
 }
 
 }  // namespace hal::ethercat::esc

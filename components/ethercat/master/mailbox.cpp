@@ -100,32 +100,36 @@ Task<MailboxResult> SlaveMailbox::send(Channel& channel, BusSlave& slave, Mailbo
     co_return succeeded();
 }
 
+SlaveMailbox::Approach SlaveMailbox::approach(const BusSlave& slave) const noexcept {
+    switch (lost_reads_ % 3) {
+    case 1: return Approach::read;
+    case 2: return Approach::shift_and_read;
+    default: break;
+    }
+    if (slave.mailbox_status != nullptr) return Approach::status_in_process_data;
+    if (eager_ && slave.area().in_size <= max_eager_bytes) return Approach::read;
+    return Approach::ask_status;
+}
+
 Task<MailboxResult> SlaveMailbox::receive(Channel& channel, BusSlave& slave,
                                           std::int64_t until_ns) noexcept {
     if (!slave.area().usable()) co_return refused();
     unsigned absent = 0;
-    bool first = slave.area().in_size <= max_eager_bytes;
     for (;;) {
         if (interrupted_) co_return failed(MailboxResult::Outcome::timed_out);
-        Full full = Full::lost;
-        // loss at regular intervals must not hit each read: vary the number of datagrams before it
-        if (lost_reads_ % 3 != 0) {
-            if (lost_reads_ % 3 == 2) {
-                co_await is_full(channel, slave, 1, 0);
-            }
-            full = Full::yes;
-        } else if (slave.mailbox_status != nullptr) {
-            full = (*slave.mailbox_status & sm_full) != 0 ? Full::yes : Full::no;
-            if (full == Full::no) {
+        Full full = Full::yes;
+        switch (approach(slave)) {
+        case Approach::read: break;
+        case Approach::shift_and_read: co_await is_full(channel, slave, 1, 0); break;
+        case Approach::status_in_process_data:
+            if ((*slave.mailbox_status & sm_full) == 0) {
+                full = Full::no;
                 co_await channel.sleep(1);  // until the next cycle
             }
-        } else if (std::exchange(first, false) && eager_) {
-            full = Full::yes;
-        } else {
-            full = co_await is_full(channel, slave, 1);
+            break;
+        case Approach::ask_status: full = co_await is_full(channel, slave, 1); break;
         }
         if (full == Full::yes) {
-            absent = 0;
             const bool got = co_await read(channel, slave, until_ns);
             if (got) co_return succeeded(reply_.payload.size());
             eager_ = false;

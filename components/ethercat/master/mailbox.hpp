@@ -140,6 +140,16 @@ public:
 private:
     friend class Hold;
     enum class Full : std::uint8_t { no, yes, absent, lost };
+    /// How receive() finds out whether there is a message.
+    enum class Approach : std::uint8_t {
+        read,
+        /// Sends another datagram before it reads again: a loss at regular intervals must not hit
+        /// each read.
+        shift_and_read,
+        status_in_process_data,
+        ask_status,
+    };
+    Approach approach(const BusSlave& slave) const noexcept;
     static std::size_t size_of_out(const BusSlave& slave) noexcept {
         return slave.area().out_size <= max_mailbox ? slave.area().out_size : max_mailbox;
     }

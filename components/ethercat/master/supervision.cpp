@@ -610,37 +610,49 @@ Task<void> watch(Channel& c, Bus& bus) noexcept {
     }
 }
 
-void update_working_counters(Bus& bus) noexcept {
-    bus.status.wkc = bus.status.wkc_expected = 0;
-    bool part = false;
-    bool any = false;
+/// Reports that a domain became complete, or is no longer.
+static void report_working_counter(Bus& bus, std::size_t n) noexcept {
+    const DomainStatus& domain = bus.image.domain(n);
+    WkcState& reported = bus.wkc_seen[n];
+    const bool is_complete = domain.state == WkcState::complete;
+    const bool was_complete = reported == WkcState::complete;
+    if (is_complete == was_complete) return;
+    bus.report(is_complete ? Event::wkc_complete : Event::wkc_incomplete,
+               static_cast<std::int64_t>(n << 16 | domain.wkc), domain.expected);
+    bus.suspicious = bus.suspicious || !is_complete;
+    reported = is_complete ? WkcState::complete : WkcState::part;
+}
+
+/// The state of all domains together. Domains that expect nothing do not count as incomplete.
+static WkcState working_counter_state(Bus& bus) noexcept {
+    bool any_complete = false;
+    bool any_incomplete = false;
     for (std::size_t n = 0; n < bus.image.domain_count(); ++n) {
-        const DomainStatus& d = bus.image.domain(n);
-        bus.status.wkc = static_cast<std::uint16_t>(bus.status.wkc + d.wkc);
-        bus.status.wkc_expected = static_cast<std::uint16_t>(bus.status.wkc_expected + d.expected);
-        part |= d.expected != 0 && d.state != WkcState::complete;
-        any |= d.state == WkcState::complete;
-        if (!d.fresh || d.expected == 0) continue;
-        WkcState& seen = bus.wkc_seen[n];
-        const bool complete = d.state == WkcState::complete;
-        if (complete != (seen == WkcState::complete)) {
-            if (complete || seen != WkcState::none || d.was_complete) {
-                bus.report(complete ? Event::wkc_complete : Event::wkc_incomplete,
-                           static_cast<std::int64_t>(n << 16 | d.wkc), d.expected);
-            }
-            if (!complete) {
-                bus.suspicious = true;
-            }
-            seen = complete ? WkcState::complete : WkcState::part;
+        const DomainStatus& domain = bus.image.domain(n);
+        if (domain.state == WkcState::complete) {
+            any_complete = true;
+        } else if (domain.expected != 0) {
+            any_incomplete = true;
         }
     }
-    if (part && bus.status.wkc != 0) {
-        bus.status.wkc_state = WkcState::part;
-    } else if (any && !part) {
-        bus.status.wkc_state = WkcState::complete;
-    } else {
-        bus.status.wkc_state = WkcState::none;
+    if (!any_incomplete) return any_complete ? WkcState::complete : WkcState::none;
+    return bus.status.wkc != 0 ? WkcState::part : WkcState::none;
+}
+
+void update_working_counters(Bus& bus) noexcept {
+    std::uint16_t wkc = 0;
+    std::uint16_t expected = 0;
+    for (std::size_t n = 0; n < bus.image.domain_count(); ++n) {
+        const DomainStatus& domain = bus.image.domain(n);
+        wkc = static_cast<std::uint16_t>(wkc + domain.wkc);
+        expected = static_cast<std::uint16_t>(expected + domain.expected);
+        if (domain.fresh && domain.expected != 0) {
+            report_working_counter(bus, n);
+        }
     }
+    bus.status.wkc = wkc;
+    bus.status.wkc_expected = expected;
+    bus.status.wkc_state = working_counter_state(bus);
 }
 
 /// Reports a slave in OP whose process data is not exchanged, and the end of that.
