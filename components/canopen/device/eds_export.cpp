@@ -130,37 +130,62 @@ bool record_by_rule(std::uint16_t index) {
     return index == 0x1018 || (index >= 0x1200 && index <= 0x1bff);
 }
 
-eds::Object object_of(const Description& d, std::span<const EntryDescription* const> entries) {
-    const auto& first = *entries.front();
-    eds::Object out;
-    out.index = first.index;
-    if (first.index == 0x1000 || first.index == 0x1001 || first.index == 0x1018) {
-        out.category = eds::Category::mandatory;
-    } else if (first.index >= 0x2000 && first.index <= 0x5fff) {
-        out.category = eds::Category::manufacturer;
-    } else {
-        out.category = eds::Category::optional;
+/// CiA 301 requires three objects of each device; 2000h..5FFFh are those of its manufacturer.
+eds::Category category_of(std::uint16_t index) {
+    if (index == 0x1000 || index == 0x1001 || index == 0x1018) return eds::Category::mandatory;
+    if (index >= 0x2000 && index <= 0x5fff) return eds::Category::manufacturer;
+    return eds::Category::optional;
+}
+
+/// The entries of one object, ascending. Sub-index 0 of an object with several entries is their
+/// number.
+using ObjectEntries = std::span<const EntryDescription* const>;
+
+bool is_single(ObjectEntries entries) { return entries.size() == 1 && entries.front()->sub == 0; }
+
+/// An ARRAY has values of one type and one access, a RECORD any.
+eds::ObjectType type_of_several(ObjectEntries entries) {
+    const auto values = entries.front()->sub == 0 ? entries.subspan(1) : entries;
+    const EntryDescription& last = *values.back();
+    const bool are_alike = std::ranges::all_of(values, [&](const EntryDescription* value) {
+        return value->type == last.type && value->access == last.access;
+    });
+    if (!are_alike || last.type == Type::domain || record_by_rule(last.index)) {
+        return eds::ObjectType::record;
     }
+    return eds::ObjectType::array;
+}
+
+eds::Object object_of(const Description& d, ObjectEntries entries) {
+    eds::Object out;
+    out.index = entries.front()->index;
+    out.category = category_of(out.index);
     for (const auto* e : entries) {
         out.entries.push_back(entry_of(*e));
     }
-    if (entries.size() == 1 && first.sub == 0) {
+    if (is_single(entries)) {
         out.name = out.entries[0].name;
         out.type = out.entries[0].type;
-        out.data_type = 0;
-        return out;
+    } else {
+        out.name = object_name(d, out.index);
+        out.type = type_of_several(entries);
     }
-    out.name = object_name(d, first.index);
-    const bool alike =
-        std::all_of(entries.begin() + (first.sub == 0), entries.end(), [&](const auto* e) {
-        return e->type == entries.back()->type && e->access == entries.back()->access &&
-               e->type != Type::domain;
-    });
-    out.type =
-        alike && !record_by_rule(first.index) ? eds::ObjectType::array : eds::ObjectType::record;
     return out;
 }
 
+/// The name of an object of CiA 402, whose axes have 800h indices each; "" for others.
+std::string drive_object_name(std::uint16_t index) {
+    constexpr unsigned first = 0x6000;
+    constexpr unsigned per_axis = 0x800;
+    if (index < first || index > 0x9fff) return {};
+    const unsigned axis = (index - first) / per_axis;
+    const unsigned index_of_first_axis = first + (index - first) % per_axis;
+    const auto name = find_name(drive_names, static_cast<std::uint16_t>(index_of_first_axis));
+    if (name.empty() || axis == 0) return name;
+    return name + " " + std::to_string(axis + 1);
+}
+
+/// Returns an UNSIGNED32 of the description; 0 if it has none.
 std::uint32_t number(const Description& d, std::uint16_t index, std::uint8_t sub) {
     const auto* e = const_cast<Description&>(d).find(index, sub);
     return e != nullptr && e->value.size() == 4 ? load<std::uint32_t>(e->value.data()) : 0;
@@ -171,45 +196,59 @@ std::uint32_t number(const Description& d, std::uint16_t index, std::uint8_t sub
 std::string object_name(const Description& d, std::uint16_t index) {
     if (const auto own = d.objects.find(index); own != d.objects.end()) return own->second;
     if (auto name = find_name(names, index); !name.empty()) return name;
-    if (index >= 0x6000 && index <= 0x9fff && (number(d, 0x1000, 0) & 0xffff) == 402) {
-        const unsigned axis = (index - 0x6000U) / 0x800;
-        if (auto name = find_name(drive_names,
-                                  static_cast<std::uint16_t>(0x6000 + (index - 0x6000U) % 0x800));
-            !name.empty()) {
-            return axis == 0 ? name : name + " " + std::to_string(axis + 1);
-        }
+    const std::uint32_t profile = number(d, 0x1000, 0) & 0xffff;
+    if (profile == 402) {
+        if (auto name = drive_object_name(index); !name.empty()) return name;
     }
     return "Object " + hexadecimal(index).substr(2) + "h";
 }
 
-eds::DeviceDescription eds_of(const Description& d) {
-    eds::DeviceDescription out;
-    std::vector<const EntryDescription*> order;
+namespace {
+
+/// The entries by index and sub-index; of repeated ones the first.
+std::vector<const EntryDescription*> sorted_entries(const Description& d) {
+    std::vector<const EntryDescription*> entries;
     for (const auto& e : d.entries) {
-        order.push_back(&e);
+        entries.push_back(&e);
     }
     const auto key = [](const EntryDescription* e) {
         return std::uint32_t{e->index} << 8 | e->sub;
     };
-    std::stable_sort(order.begin(), order.end(), [&](auto* a, auto* b) { return key(a) < key(b); });
-    order.erase(
-        std::unique(order.begin(), order.end(), [&](auto* a, auto* b) { return key(a) == key(b); }),
-        order.end());
-    for (std::size_t from = 0, to = 0; from < order.size(); from = to) {
-        while (to < order.size() && order[to]->index == order[from]->index) {
-            ++to;
-        }
-        out.objects.push_back(object_of(d, std::span(order).subspan(from, to - from)));
+    std::ranges::stable_sort(entries, {}, key);
+    const auto repeated = std::ranges::unique(entries, {}, key);
+    entries.erase(repeated.begin(), repeated.end());
+    return entries;
+}
+
+/// The number of entries from the front that belong to the same object.
+std::size_t object_size(ObjectEntries entries) {
+    const std::uint16_t index = entries.front()->index;
+    const auto next_object =
+        std::ranges::find_if(entries, [&](const EntryDescription* e) { return e->index != index; });
+    return static_cast<std::size_t>(next_object - entries.begin());
+}
+
+/// The number of PDOs whose communication parameters begin at this index.
+std::uint16_t count_pdos(const std::vector<eds::Object>& objects, std::uint16_t first) {
+    return static_cast<std::uint16_t>(std::ranges::count_if(objects, [&](const eds::Object& o) {
+        return o.index >= first && o.index < first + 0x200;
+    }));
+}
+
+}  // namespace
+
+eds::DeviceDescription eds_of(const Description& d) {
+    eds::DeviceDescription out;
+    const std::vector<const EntryDescription*> entries = sorted_entries(d);
+    ObjectEntries rest(entries);
+    while (!rest.empty()) {
+        const std::size_t size = object_size(rest);
+        out.objects.push_back(object_of(d, rest.first(size)));
+        rest = rest.subspan(size);
     }
-    const auto count = [&](std::uint16_t first) {
-        return static_cast<std::uint16_t>(std::count_if(
-            out.objects.begin(), out.objects.end(),
-            [&](const eds::Object& o) { return o.index >= first && o.index < first + 0x200; }));
-    };
     auto& info = out.device;
     info.vendor_number = number(d, 0x1018, 1);
     info.product_number = number(d, 0x1018, 2);
-
     info.revision_number = number(d, 0x1018, 3);
     if (const auto* name = const_cast<Description&>(d).find(0x1008, 0); name != nullptr) {
         info.product_name.assign(name->value.begin(), name->value.end());
@@ -217,15 +256,17 @@ eds::DeviceDescription eds_of(const Description& d) {
     for (std::size_t n = 0; n < eds::baud_rates.size(); ++n) {
         info.supports[n] = eds::baud_rates[n] != 100;
     }
-    info.boot_up_slave = info.lss = true;
+    info.boot_up_slave = true;
+    info.lss = true;
     info.granularity = 1;
-    info.rx_pdos = count(0x1400);
-    info.tx_pdos = count(0x1800);
+    info.rx_pdos = count_pdos(out.objects, 0x1400);
+    info.tx_pdos = count_pdos(out.objects, 0x1800);
     for (std::uint16_t type = 1; type <= 7; ++type) {
         out.dummies.emplace_back(type, true);
     }
     out.file.eds_version = "4.0";
-    out.file.version = out.file.revision = 1;
+    out.file.version = 1;
+    out.file.revision = 1;
     return out;
 }
 

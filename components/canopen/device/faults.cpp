@@ -203,36 +203,75 @@ bool Faults::periodic(Fault fault) noexcept {
     return true;
 }
 
+namespace {
+
+/// What a frame of an SDO client is (CiA 301, 7.2.4.3).
+enum class SdoCommand {
+    names_object,  ///< its bytes 1 to 3 are index and sub-index
+    start_block_upload,
+    acknowledge_block,
+    abort,
+    other,
+};
+
+SdoCommand sdo_command(std::uint8_t specifier) noexcept {
+    switch (specifier) {
+    case 0x80: return SdoCommand::abort;
+    case 0xa2: return SdoCommand::acknowledge_block;
+    case 0xa3: return SdoCommand::start_block_upload;
+    default: break;
+    }
+    switch (specifier >> 5) {
+    case 1:  // download
+    case 2:  // upload
+    case 6:  // block download
+        return SdoCommand::names_object;
+    case 5:  // block upload
+        return (specifier & 3) == 0 ? SdoCommand::names_object : SdoCommand::other;
+    default: return SdoCommand::other;
+    }
+}
+
+bool is_sdo_request(const Frame& f, std::uint8_t node) noexcept {
+    return f.id == 0x600U + node && !f.extended && f.length == 8;
+}
+
+}  // namespace
+
 bool Faults::swallows(const Frame& f, std::uint8_t node, Time now) noexcept {
     start(now);
     if (hit(Fault::deaf)) return true;
-    if (f.id != 0x600U + node || f.extended || f.length != 8) return false;
-    const auto command = f.data[0];
-    const auto kind = static_cast<std::uint8_t>(command >> 5);
-    if (command == 0x80) {
-        block_ = Block::none;
-        return false;
+    if (is_sdo_request(f, node)) {
+        follow_transfer(f);
     }
-    // these bytes are data until the device acknowledges the block
-    if (block_ == Block::receiving) return false;
-    if (command == 0xa3) {
+    return false;
+}
+
+void Faults::follow_transfer(const Frame& request) noexcept {
+    const SdoCommand command = sdo_command(request.data[0]);
+    // between start and acknowledgement of a block all bytes but those of an abort are data
+    if (block_ == Block::receiving && command != SdoCommand::abort) return;
+    switch (command) {
+    case SdoCommand::start_block_upload:
         block_ = Block::sending;
         last_sequence_ = 0;
-        return false;
-    }
-    if (command == 0xa2) {
-        if (block_ == Block::sending && last_sequence_ != 0 && f.data[1] == last_sequence_) {
+        break;
+    case SdoCommand::acknowledge_block: {
+        const bool was_all = last_sequence_ != 0 && request.data[1] == last_sequence_;
+        if (block_ == Block::sending && was_all) {
             block_ = Block::ending;
         }
         last_sequence_ = 0;
-        return false;
+        break;
     }
-    block_ = Block::none;
-    if (kind == 1 || kind == 2 || (kind == 5 && (command & 3) == 0) || kind == 6) {
+    case SdoCommand::names_object:
+        block_ = Block::none;
         previous_ = request_;
-        std::copy_n(f.data.begin() + 1, 3, request_.begin());
+        std::copy_n(request.data.begin() + 1, request_.size(), request_.begin());
+        break;
+    case SdoCommand::abort:
+    case SdoCommand::other: block_ = Block::none; break;
     }
-    return false;
 }
 
 void Faults::identity(Frame& f) noexcept {

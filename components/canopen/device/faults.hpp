@@ -133,6 +133,9 @@ private:
     bool any_ = false;
     bool started_ = false;
     Time began_ = 0;
+    /// Follows the SDO transfer by a frame of the client.
+    void follow_transfer(const Frame& request) noexcept;
+
     Time now_ = 0;
     // The SDO transfer in progress, to distinguish frames that look alike.
     enum class Block : std::uint8_t { none, receiving, sending, ending } block_ = Block::none;
