@@ -63,6 +63,45 @@ std::string execute(ReplayedMachine& machine) {
     return "the execution ends early: " + machine.execution().reason();
 }
 
+struct ValueComparison {
+    std::size_t values = 0;
+    std::size_t wrong = 0;
+    std::string differences;  ///< a line each
+};
+
+/// Compares the values of the machine with the lines NAME VALUE of the file.
+ValueComparison compare_values(Session& session, const std::string& expected) {
+    ValueComparison comparison;
+    std::istringstream lines(expected);
+    std::string name;
+    std::string value;
+    while (lines >> name && std::getline(lines, value)) {
+        value.erase(0, value.find_first_not_of(' '));
+        const std::string actual = value_of(session, name);
+        ++comparison.values;
+        if (actual != value) {
+            ++comparison.wrong;
+            comparison.differences += fmt::format("{} {} instead of {}\n", name, actual, value);
+        }
+    }
+    return comparison;
+}
+
+std::string divergence_text(const ReExecution& execution) {
+    const auto& diverged = execution.diverged();
+    if (!diverged) return "";
+    return fmt::format("first cycle that differs from the journal: {} of '{}' at {:.6f} s\n",
+                       diverged->number, diverged->thread, seconds(diverged->time_ns));
+}
+
+std::string summary_of(const ValueComparison& comparison, std::uint64_t cycles) {
+    if (comparison.values == 0) {
+        return fmt::format("'{}' has no line with a name and a value\n", expected_name);
+    }
+    return fmt::format("{}: {}, {} not as expected\n", counted(cycles, "cycle"),
+                       counted(comparison.values, "value"), comparison.wrong);
+}
+
 }  // namespace
 
 int write_journal_test(const ReplayOptions& options, const JournalFile& file,
@@ -115,50 +154,40 @@ bool is_journal_test(const std::string& path) {
 
 int run_journal_test(const ReplayOptions& options) {
     const fs::path folder = options.words[0];
-    std::string text;
-    if (!read_file((folder / expected_name).string(), text)) return fail(options, text);
-    ReplayOptions own = options;
-    own.words = {(folder / journal_name).string()};
+    std::string expected;
+    if (!read_file((folder / expected_name).string(), expected)) {
+        const std::string& reason = expected;
+        return fail(options, reason);
+    }
+    const std::string journal = (folder / journal_name).string();
     JournalFile file;
-    if (!file.open(own.words[0])) {
-        return fail(options, fmt::format("cannot execute '{}': {}", own.words[0], file.problem()));
+    if (!file.open(journal)) {
+        return fail(options, fmt::format("cannot execute '{}': {}", journal, file.problem()));
     }
     for (const std::string& remark : file.notes()) {
         note(options, remark);
     }
-    // a test is run with other versions: it is there for that
-    if (const int status = JournaledProgram(own, file).check_devices(); status != 0) return status;
-    ReplayedMachine machine(own, file, ReplayedMachine::Compare::checksums);
+    ReplayOptions journal_options = options;
+    journal_options.words = {journal};
+    // the program and the plugins may be others than those of the journal: the test compares them
+    const int status = JournaledProgram(journal_options, file).check_devices();
+    if (status != 0) return status;
+    ReplayedMachine machine(journal_options, file, ReplayedMachine::Compare::checksums);
     const auto lock = machine.session().lock();
     const std::string problem = execute(machine);
     std::string report;
-    std::size_t values = 0;
-    std::size_t wrong = 0;
-    std::istringstream lines(text);
-    for (std::string name, value; problem.empty() && lines >> name && std::getline(lines, value);) {
-        ++values;
-        value.erase(0, value.find_first_not_of(' '));
-        const std::string now = value_of(machine.session(), name);
-        if (now == value) continue;
-        ++wrong;
-        report += fmt::format("{} {} instead of {}\n", name, now, value);
-    }
-    if (const auto& diverged = machine.execution().diverged()) {
-        report += fmt::format("first cycle that differs from the journal: {} of '{}' at {:.6f} s\n",
-                              diverged->number, diverged->thread, seconds(diverged->time_ns));
-    }
-    if (!problem.empty()) {
-        report += problem + "\n";
-    } else if (values == 0) {
-        report += fmt::format("'{}' has no line with a name and a value\n", expected_name);
+    bool passed = false;
+    if (problem.empty()) {
+        const ValueComparison comparison = compare_values(machine.session(), expected);
+        passed = comparison.values > 0 && comparison.wrong == 0;
+        report = comparison.differences + divergence_text(machine.execution()) +
+                 summary_of(comparison, machine.execution().cycles());
     } else {
-        report += fmt::format("{}: {}, {} not as expected\n",
-                              counted(machine.execution().cycles(), "cycle"),
-                              counted(values, "value"), wrong);
+        report = divergence_text(machine.execution()) + problem + "\n";
     }
     machine.execution().finish();
     if (!print(report)) return 1;
-    return exit_code(problem.empty() && values > 0 && wrong == 0);
+    return exit_code(passed);
 }
 
 }  // namespace hal::tools
