@@ -9,6 +9,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fmt/core.h>
+#include <optional>
 #include <sys/stat.h>
 #include <unistd.h>
 #include <utility>
@@ -172,42 +173,60 @@ bool passes_default_check(const CompileOptions& options, const BuiltPlugin& buil
     return true;
 }
 
-}  // namespace
-
-int compile_file(const CompileOptions& options, const std::string& path) {
+/// Returns the kind of a file that can be read, or nullptr after printing what is wrong.
+const Kind* kind_of(const CompileOptions& options, const std::string& path) {
     const std::string extension = fs::path(path).extension().string();
-    const Kind* kind = std::find_if(std::begin(kinds), std::end(kinds),
-                                    [&](const Kind& k) { return extension == k.extension; });
+    const Kind* const kind = std::ranges::find(kinds, extension, &Kind::extension);
     if (kind == std::end(kinds)) {
-        return fail(options, fmt::format("unknown file type of '{}'; use .cpp, .c or .comp", path));
+        fail(options, fmt::format("unknown file type of '{}'; use .cpp, .c or .comp", path));
+        return nullptr;
     }
     if (::access(path.c_str(), R_OK) != 0) {
-        return fail(options, fmt::format("{}: {}", path, std::strerror(errno)));
+        fail(options, fmt::format("{}: {}", path, std::strerror(errno)));
+        return nullptr;
     }
-    if (struct stat about{};
-        ::stat(path.c_str(), &about) == 0 &&
-        !S_ISREG(about.st_mode)) {  // a compiler would wait for the other end of a FIFO
-        return fail(options,
-                    fmt::format("'{}' cannot be compiled: {}", path, special_kind(about.st_mode)));
+    struct stat about{};
+    if (::stat(path.c_str(), &about) == 0 && !S_ISREG(about.st_mode)) {
+        // a compiler would wait for the other end of a FIFO
+        fail(options,
+             fmt::format("'{}' cannot be compiled: {}", path, special_kind(about.st_mode)));
+        return nullptr;
     }
+    return kind;
+}
+
+/// What is to be compiled, with the arguments of the command line. Nothing after printing the
+/// reason.
+std::optional<PluginSource> source_of(const CompileOptions& options, const std::string& path) {
+    const Kind* const kind = kind_of(options, path);
+    if (kind == nullptr) return std::nullopt;
     PluginSource source;
     source.name = fs::path(path).stem().string();
     source.path = path;
-    if (!kind->prepare(options, path, source)) return 1;
+    if (!kind->prepare(options, path, source)) return std::nullopt;
     source.program = source.program || (options.as_program && source.language == Language::c);
-    source.options.insert(source.options.end(), options.compile_args.begin(),
-                          options.compile_args.end());
-    source.options.insert(source.options.end(), options.link_args.begin(), options.link_args.end());
+    for (const auto* arguments : {&options.compile_args, &options.link_args}) {
+        source.options.insert(source.options.end(), arguments->begin(), arguments->end());
+    }
+    if (options.keep && !source.text) {
+        fail(options,
+             fmt::format("--keep applies to .comp files only; '{}' is compiled directly", path));
+        return std::nullopt;
+    }
+    return source;
+}
+
+}  // namespace
+
+int compile_file(const CompileOptions& options, const std::string& path) {
+    const std::optional<PluginSource> source = source_of(options, path);
+    if (!source) return 1;
     BuildOptions build;
     build.folder = options.output;
     if (options.keep) {
-        build.keep = source.name + (source.language == Language::cpp ? ".cpp" : ".c");
+        build.keep = source->name + (source->language == Language::cpp ? ".cpp" : ".c");
     }
-    if (options.keep && !source.text) {
-        return fail(
-            options,
-            fmt::format("--keep applies to .comp files only; '{}' is compiled directly", path));
-    }
+    // the messages of the compiler go before those of the check
     bool printed = false;
     const auto print_messages = [&](const BuiltPlugin& built) {
         if (!std::exchange(printed, true)) {
@@ -217,18 +236,18 @@ int compile_file(const CompileOptions& options, const std::string& path) {
     if (!options.no_check_rt) {
         build.fit = [&](const BuiltPlugin& built) {
             print_messages(built);
-            return options.check_rt ? passes_check(options, built, source)
-                                    : passes_default_check(options, built, source, path);
+            return options.check_rt ? passes_check(options, built, *source)
+                                    : passes_default_check(options, built, *source, path);
         };
     }
-    const BuiltPlugin built = build_plugin(source, build);
+    const BuiltPlugin built = build_plugin(*source, build);
     print_messages(built);
     if (!built.good) return fail(options, built.problem);
     if (!built.hint.empty()) {
         print_note(options, built.hint);
     }
     if (!options.classic) {
-        announce(built, source.program, !options.output.empty());
+        announce(built, source->program, !options.output.empty());
     }
     return 0;
 }
