@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <cstring>
 #include <fcntl.h>
+#include <optional>
 #include <poll.h>
 #include <stdexcept>
 #include <sys/ioctl.h>
@@ -102,35 +103,17 @@ public:
         return false;
     }
 
+    /// Reads the newest frame that the driver has. Older ones are skipped.
     Got next(std::int64_t now, std::int64_t timeout, Frame& frame) override {
         const int ready = system_.wait(fd_, static_cast<int>(timeout / 1'000'000));
         if (ready < 0) return unplugged();
         if (ready == 0) return Got::nothing;
-        bool there = false;
-        v4l2_buffer newest{};
-        for (;;) {
-            v4l2_buffer buffer = blank();
-            if (system_.control(fd_, VIDIOC_DQBUF, &buffer) == -1) {
-                if (errno == EAGAIN) break;
-                if (there) {
-                    give_back(newest);
-                }
-                return unplugged();
-            }
-            if (buffer.index >= maps_.size()) {
-                continue;  // no driver does
-            }
-            if (there) {
-                give_back(newest);
-            }
-            newest = buffer;
-            there = true;
-        }
-        if (!there) return Got::nothing;
-        const bool useful = take(newest, now, frame);
-        if (!give_back(newest)) return unplugged();
-        if (useful) return Got::frame;
-        return Got::bad;
+        std::optional<v4l2_buffer> newest;
+        const bool is_connected = dequeue_newest(newest);
+        if (!newest) return is_connected ? Got::nothing : unplugged();
+        const bool is_valid = is_connected && read_frame(*newest, now, frame);
+        if (!give_back(*newest) || !is_connected) return unplugged();
+        return is_valid ? Got::frame : Got::bad;
     }
 
     void close() noexcept override {
@@ -163,6 +146,18 @@ private:
     bool give_back(const v4l2_buffer& taken) {
         v4l2_buffer buffer = blank(taken.index);
         return system_.control(fd_, VIDIOC_QBUF, &buffer) != -1;
+    }
+    /// Gives all filled buffers but the newest back. Returns false if the camera is gone.
+    bool dequeue_newest(std::optional<v4l2_buffer>& newest) {
+        for (;;) {
+            v4l2_buffer buffer = blank();
+            if (system_.control(fd_, VIDIOC_DQBUF, &buffer) == -1) return errno == EAGAIN;
+            if (buffer.index >= maps_.size()) continue;  // no driver does
+            if (newest) {
+                give_back(*newest);
+            }
+            newest = buffer;
+        }
     }
     Got unplugged() {
         fail(FrameError::unplugged, device_ + " was unplugged");
@@ -242,40 +237,48 @@ private:
                             " -pix_fmt yuyv422 -f v4l2 /dev/videoN makes YUYV of it for a "
                             "v4l2loopback device");
         }
+        const bool wants_grey = offered.grey && (grey_ || !offered.yuyv);
+        is_yuyv_ = !wants_grey;
+        const std::uint32_t pixel_format = wants_grey ? V4L2_PIX_FMT_GREY : V4L2_PIX_FMT_YUYV;
         v4l2_format format{};
         format.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
         format.fmt.pix.width = static_cast<std::uint32_t>(width_);
         format.fmt.pix.height = static_cast<std::uint32_t>(height_);
-        const bool takes_grey = offered.grey && (grey_ || !offered.yuyv);
-        format.fmt.pix.pixelformat = takes_grey ? V4L2_PIX_FMT_GREY : V4L2_PIX_FMT_YUYV;
+        format.fmt.pix.pixelformat = pixel_format;
         format.fmt.pix.field = V4L2_FIELD_NONE;
-        const std::uint32_t wanted = format.fmt.pix.pixelformat;
         if (system_.control(fd_, VIDIOC_S_FMT, &format) == -1) return failed("format rejected");
-        const v4l2_pix_format& is = format.fmt.pix;
-        if (is.pixelformat != wanted) {
+        return accept(format.fmt.pix, pixel_format);
+    }
+    /// Checks the format that the driver has set, which may be another one. Returns false after
+    /// reporting that.
+    bool accept(const v4l2_pix_format& set, std::uint32_t pixel_format) {
+        if (set.pixelformat != pixel_format) {
             return fail(FrameError::unusable,
-                        device_ + " gives " + four_letters(is.pixelformat) + " and not " +
-                            four_letters(wanted) +
+                        device_ + " gives " + four_letters(set.pixelformat) + " and not " +
+                            four_letters(pixel_format) +
                             " at this size; take a smaller one: v4l2-ctl -d " + device_ +
                             " --list-formats-ext");
         }
-        if (is.width != static_cast<std::uint32_t>(width_) ||
-            is.height != static_cast<std::uint32_t>(height_)) {
+        if (set.width != static_cast<std::uint32_t>(width_) ||
+            set.height != static_cast<std::uint32_t>(height_)) {
             return fail(FrameError::unusable,
                         device_ + " has no frames of " + std::to_string(width_) + " x " +
                             std::to_string(height_) + "; write v4l2:" + device_ + "?width=" +
-                            std::to_string(is.width) + "&height=" + std::to_string(is.height));
+                            std::to_string(set.width) + "&height=" + std::to_string(set.height));
         }
-        is_yuyv_ = wanted == V4L2_PIX_FMT_YUYV;
-        const std::size_t row = static_cast<std::size_t>(width_) * (is_yuyv_ ? 2 : 1);
-        line_ = std::max<std::size_t>(is.bytesperline, row);
-        if (!Frame::fits(width_, height_) || line_ > std::size_t{16} * max_width ||
-            (is_yuyv_ && width_ % 2 != 0)) {
+        line_ = std::max<std::size_t>(set.bytesperline, row_bytes());
+        const bool has_half_pair = is_yuyv_ && width_ % 2 != 0;
+        const bool line_is_too_long = line_ > std::size_t{16} * max_width;
+        if (!Frame::fits(width_, height_) || line_is_too_long || has_half_pair) {
             return fail(FrameError::too_large, "frames of " + std::to_string(width_) + " x " +
                                                    std::to_string(height_) +
                                                    " are larger than a frame may be");
         }
         return true;
+    }
+    std::size_t row_bytes() const {
+        const std::size_t bytes_per_pixel = is_yuyv_ ? 2 : 1;
+        return static_cast<std::size_t>(width_) * bytes_per_pixel;
     }
     /// The camera may have other rates, or a fixed one: this is logged, and frames are used at its
     /// rate.
@@ -284,19 +287,22 @@ private:
         parameters.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
         v4l2_fract& period = parameters.parm.capture.timeperframe;
         period = {1000, static_cast<std::uint32_t>(std::lround(fps_ * 1000.0))};
-        const bool chosen = system_.control(fd_, VIDIOC_S_PARM, &parameters) != -1 &&
-                            period.numerator != 0 && period.denominator != 0;
-        given_fps_ = chosen ? std::clamp(static_cast<double>(period.denominator) / period.numerator,
-                                         0.1, 1000.0)
-                            : fps_;
-        if (chosen && std::fabs(given_fps_ - fps_) > 0.01 * fps_) {
+        const bool is_settable = system_.control(fd_, VIDIOC_S_PARM, &parameters) != -1 &&
+                                 period.numerator != 0 && period.denominator != 0;
+        remark_.clear();
+        if (!is_settable) {
+            given_fps_ = fps_;
+            if (asked_) {
+                remark_ = device_ + " has a fixed frame rate; fps=" + rate(fps_) + " has no effect";
+            }
+            return true;
+        }
+        const double set_fps = static_cast<double>(period.denominator) / period.numerator;
+        given_fps_ = std::clamp(set_fps, 0.1, 1000.0);
+        if (std::fabs(given_fps_ - fps_) > 0.01 * fps_) {
             remark_ = device_ + " gives " + rate(given_fps_) + " frames per second, not " +
                       rate(fps_) + "; to list the rates of each size: v4l2-ctl -d " + device_ +
                       " --list-formats-ext";
-        } else if (!chosen && asked_) {
-            remark_ = device_ + " has a fixed frame rate; fps=" + rate(fps_) + " has no effect";
-        } else {
-            remark_.clear();
         }
         return true;
     }
@@ -331,16 +337,10 @@ private:
         return system_.control(fd_, VIDIOC_STREAMON, &type) != -1 || failed("it does not start");
     }
 
-    bool take(const v4l2_buffer& buffer, std::int64_t now, Frame& frame) {
-        // The driver also counts frames that it lost; frames skipped here leave the same gap in the
-        // sequence.
-        if (any_) {
-            skipped_ += buffer.sequence - last_ - 1u;
-        }
-        last_ = buffer.sequence;
-        any_ = true;
-        const std::size_t row = static_cast<std::size_t>(width_) * (is_yuyv_ ? 2 : 1);
-        const std::size_t needed = line_ * static_cast<std::size_t>(height_ - 1) + row;
+    /// Copies the frame of a buffer. Returns false after reporting that it is damaged.
+    bool read_frame(const v4l2_buffer& buffer, std::int64_t now, Frame& frame) {
+        count_skipped(buffer.sequence);
+        const std::size_t needed = line_ * static_cast<std::size_t>(height_ - 1) + row_bytes();
         const Map& map = maps_[buffer.index];
         if ((buffer.flags & V4L2_BUF_FLAG_ERROR) != 0) {
             return fail(FrameError::damaged, device_ + " marks a frame as damaged");
@@ -353,17 +353,7 @@ private:
         frame.resize(width_, height_, is_yuyv_ && !grey_ ? Format::bgr : Format::grey);
         const auto* const bytes = static_cast<const std::uint8_t*>(map.at);
         for (int y = 0; y < height_; ++y) {
-            const std::uint8_t* const from = bytes + line_ * static_cast<std::size_t>(y);
-            std::uint8_t* const to = frame.row(y);
-            if (!is_yuyv_) {
-                std::memcpy(to, from, row);
-            } else if (grey_) {
-                for (std::size_t x = 0; x < row / 2; ++x) {
-                    to[x] = from[2 * x];
-                }
-            } else {
-                yuyv_to_bgr(from, to, static_cast<std::size_t>(width_));
-            }
+            copy_row(bytes + line_ * static_cast<std::size_t>(y), frame.row(y));
         }
         frame.number = buffer.sequence;
         const bool monotonic =
@@ -372,6 +362,27 @@ private:
                                          std::int64_t{buffer.timestamp.tv_usec} * 1000
                                    : now;
         return true;
+    }
+    /// The driver also counts frames that it lost; frames skipped here leave the same gap in the
+    /// sequence.
+    void count_skipped(std::uint32_t sequence) {
+        if (any_) {
+            skipped_ += sequence - last_ - 1u;
+        }
+        last_ = sequence;
+        any_ = true;
+    }
+    void copy_row(const std::uint8_t* from, std::uint8_t* to) const {
+        const auto width = static_cast<std::size_t>(width_);
+        if (!is_yuyv_) {
+            std::memcpy(to, from, width);
+        } else if (grey_) {
+            for (std::size_t x = 0; x < width; ++x) {
+                to[x] = from[2 * x];
+            }
+        } else {
+            yuyv_to_bgr(from, to, width);
+        }
     }
 
     VideoSystem& system_;
@@ -385,7 +396,7 @@ private:
     bool asked_ = false;
     bool grey_ = false;
     bool is_yuyv_ = false;
-    bool any_ = false;
+    bool any_ = false;  // a frame was read since the camera was opened
     std::size_t line_ = 0;  // bytes from row to row
     std::uint32_t last_ = 0;  // sequence number of the frame before
     std::vector<Map> maps_;
