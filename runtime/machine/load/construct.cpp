@@ -367,7 +367,7 @@ public:
           plugin_(*component.plugin),
           singleton_(plugin_.flags & HAL_COMPONENT_SINGLETON) {}
 
-    /// Makes the first instance, whose arguments tell the number if the line does not, then the
+    /// Makes the first instance, whose arguments give the number if the line does not, then the
     /// others. False after reporting.
     bool make() {
         if (singleton_ && (request_.names.size() > 1 || request_.count > 1)) {
