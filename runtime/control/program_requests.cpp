@@ -359,7 +359,7 @@ void declare_component(const Program& by, const Json& body, std::string& reply) 
         reply += ",\"first\":" + std::to_string(first_new);
         append_values(reply, by, added);
     }
-    // a component that does not declare it is ready with its first request
+    // without `ready` a component is ready with its first request
     if (wanted.ready || origin != ComponentOrigin::own) {
         programs.set_ready(entry, wanted.ready.value_or(true));
     }

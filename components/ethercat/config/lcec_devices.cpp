@@ -277,7 +277,7 @@ private:
     }
 
     /// A line `param NAME OBJECT/BITS [*FACTOR] [for=CHANNEL] [WORD=VALUE[;SETTING=NUMBER...]...]`.
-    /// Without words the value of the modParam is a number; each SETTING changes CHANNEL.
+    /// Without any WORD the modParam is a number; each SETTING changes CHANNEL.
     struct ParameterLine {
         struct Choice {
             std::string word;
