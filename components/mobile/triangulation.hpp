@@ -35,6 +35,28 @@ struct Fix {
 
 inline double wrapped(double angle) noexcept { return std::remainder(angle, 2 * std::numbers::pi); }
 
+/// Adds the mean of the three headings that the bearings give at this position. The fix is valid if
+/// they agree within 0.1 rad.
+inline void add_heading(Fix& fix, const std::array<Place, 3>& beacons,
+                        const std::array<double, 3>& bearings) noexcept {
+    double cosines = 0.0;
+    double sines = 0.0;
+    double first = 0.0;
+    bool agree = true;
+    for (std::size_t i = 0; i < beacons.size(); ++i) {
+        const double direction = std::atan2(beacons[i].y - fix.y, beacons[i].x - fix.x);
+        const double heading = direction - bearings[i];
+        if (i == 0) {
+            first = heading;
+        }
+        agree = agree && std::fabs(wrapped(heading - first)) < 0.1;
+        cosines += std::cos(heading);
+        sines += std::sin(heading);
+    }
+    fix.heading = std::atan2(sines, cosines);
+    fix.valid = agree;
+}
+
 /// Returns the pose from which the beacons have these bearings, relative to the heading, rad.
 /// Invalid where |D| is below `min_d`, or where the bearings contradict each other by more than
 /// 0.1 rad. [any]
@@ -67,21 +89,7 @@ inline Fix triangulate(const std::array<Place, 3>& beacons, const std::array<dou
     fix.x = b2.x + k * (y12 - y23) / d;
     fix.y = b2.y + k * (x23 - x12) / d;
     if (!std::isfinite(fix.x + fix.y)) return fix;
-    double c = 0.0;
-    double s = 0.0;
-    double first = 0.0;
-    bool agree = true;
-    for (std::size_t i = 0; i < 3; ++i) {
-        const double heading = std::atan2(beacons[i].y - fix.y, beacons[i].x - fix.x) - bearings[i];
-        if (i == 0) {
-            first = heading;
-        }
-        agree = agree && std::fabs(wrapped(heading - first)) < 0.1;
-        c += std::cos(heading);
-        s += std::sin(heading);
-    }
-    fix.heading = std::atan2(s, c);
-    fix.valid = agree;
+    add_heading(fix, beacons, bearings);
     return fix;
 }
 
