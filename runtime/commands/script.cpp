@@ -23,6 +23,7 @@ bool only_looks(const CommandRow& row, const Command& command) {
 /// `hal check` starts no programs: notes which names are theirs.
 void note_program(Absences& absences, const Command& command) {
     std::vector<std::string> names;
+    std::vector<std::string> arguments;
     std::string program;
     for (std::size_t i = 0; i < command.args.size(); ++i) {
         const std::string& word = command.args[i].text;
@@ -35,9 +36,11 @@ void note_program(Absences& absences, const Command& command) {
         names.push_back(std::filesystem::path(word).stem().string());
         if (program.empty()) {
             program = word;
+        } else {
+            arguments.push_back(word);
         }
     }
-    absences.note_program(program, names);
+    absences.note_program(program, names, arguments);
 }
 
 }  // namespace

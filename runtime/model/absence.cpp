@@ -47,13 +47,21 @@ void Absences::assume(const std::string& name) {
     note(std::move(dashed), cause);
 }
 
-void Absences::note_program(const std::string& program, const std::vector<std::string>& names) {
-    has_programs_ = true;
+void Absences::note_program(const std::string& program, const std::vector<std::string>& names,
+                            std::vector<std::string> arguments) {
+    programs_.push_back({program, std::move(arguments)});
     const Cause cause =
         add("program " + hal::quoted(program), "which is not started here", {}, Scope::names);
     for (const std::string& name : names) {
         note(name, cause);
     }
+}
+
+const std::string* Absences::argument_of(const std::string& program) const {
+    const auto last = std::find_if(programs_.rbegin(), programs_.rend(),
+                                   [&](const Program& one) { return one.name == program; });
+    if (last == programs_.rend() || last->arguments.empty()) return nullptr;
+    return &last->arguments.front();
 }
 
 void Absences::note_missing_text(const std::string& path) {

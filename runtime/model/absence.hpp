@@ -55,9 +55,13 @@ public:
     /// Returns whether `name` was passed to assume().
     bool is_assumed(const std::string& name) const { return assumed_.contains(name); }
 
-    /// `hal check` does not start programs: the names that this one would register as components.
-    void note_program(const std::string& program, const std::vector<std::string>& names);
-    bool has_programs() const { return has_programs_; }
+    /// `hal check` does not start programs: the names that this one would register as components,
+    /// and its arguments without options.
+    void note_program(const std::string& program, const std::vector<std::string>& names,
+                      std::vector<std::string> arguments = {});
+    bool has_programs() const { return !programs_.empty(); }
+    /// Returns the first argument of the last program of this name; nullptr when there is none.
+    const std::string* argument_of(const std::string& program) const;
     /// A netlist that cannot be read: names that it may define are not errors in the texts after
     /// it.
     void note_missing_text(const std::string& path);
@@ -81,7 +85,12 @@ private:
     void count(Cause cause);
     void report(Entry& entry, std::vector<Diagnostic>& all) const;
 
+    struct Program {
+        std::string name;
+        std::vector<std::string> arguments;
+    };
     std::vector<Entry> causes_;
+    std::vector<Program> programs_;
     std::unordered_map<std::string, std::optional<Cause>> names_;
     std::unordered_map<std::string, Cause> assumed_;
     std::optional<Cause> last_, several_;
@@ -89,7 +98,6 @@ private:
     std::unordered_set<std::string> heads_;  ///< the names of the model up to their first dot
     std::size_t heads_of_ = 0;  ///< how many names the model had
     bool open_ = false;
-    bool has_programs_ = false;
 };
 
 }  // namespace hal

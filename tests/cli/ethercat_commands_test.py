@@ -104,6 +104,23 @@ class Slaves(Ethercat):
             said,
         )
 
+    def test_a_check_reads_the_file_of_lcec_conf(self):
+        (self.folder / "machine.xml").write_text(
+            '<masters><master idx="0" appTimePeriod="1000000">\n'
+            '<slave idx="0" type="EL1008" name="y"/></master></masters>'
+        )
+        (self.folder / "named.hal").write_text(
+            "loadusr -W lcec_conf machine.xml\nloadrt lcec\nnet a lcec.0.y.din-77\n"
+        )
+        said = self.bad("check", "named.hal")
+        self.assertNotIn("ethercat-conf.xml", said)
+        self.assertIn("error: unknown pin 'lcec.0.y.din-77' [no-such-pin]\n", said)
+        (self.folder / "named.hal").write_text("loadusr -W lcec_conf other.xml\nloadrt lcec\n")
+        self.assertIn(
+            "config=ethercat-conf.xml: cannot read file 'other.xml': No such file or directory",
+            self.bad("check", "named.hal"),
+        )
+
     def test_a_type_of_lcec_that_is_not_supported_can_be_assumed(self):
         (self.folder / "ethercat-conf.xml").write_text(
             '<masters><master idx="0" appTimePeriod="1000000">\n<slave idx="0" type="Ph3LM2RM" name="x"/>'

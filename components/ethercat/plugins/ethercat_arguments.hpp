@@ -16,6 +16,7 @@
 #include "hal/component.hpp"
 #include "hal/naming.hpp"
 #include "hal/texts.hpp"
+#include "hal/unstarted.h"
 #include "text/numbers.hpp"
 
 namespace hal::ethercat {
@@ -79,10 +80,7 @@ struct EthercatArguments {
             throw std::invalid_argument(
                 "missing configuration; type: loadrt ethercat config=FILE.ethercat");
         }
-        const std::string handed = lcec_ && file.get() == usual_file_
-                                       ? config::lcec_configuration(getpid())
-                                       : std::string();
-        const std::string path = handed.empty() ? texts.find(file.get()) : handed;
+        const std::string path = path_of_file(texts);
         std::string text;
         if (!config::read_from_disk(path, text)) {
             throw hal::ArgumentError(
@@ -134,6 +132,18 @@ struct EthercatArguments {
     }
 
 private:
+    /// Returns the path of the configuration: as written, or for `lcec` that of `lcec_conf`, which
+    /// `hal check` does not start.
+    std::string path_of_file(const hal::Texts& texts) const {
+        if (!lcec_ || file.get() != usual_file_) return texts.find(file.get());
+        const std::string handed = config::lcec_configuration(getpid());
+        if (!handed.empty()) return handed;
+        const auto* const unstarted = hal::extension<hal_unstarted>(HAL_UNSTARTED);
+        const char* const checked =
+            unstarted ? unstarted->argument(hal::detail::creating, "lcec_conf") : nullptr;
+        return texts.find(checked ? checked : file.get());
+    }
+
     /// Rejects a cycle that is not the one whose parts are the samples of a slave.
     static void check_samples(const config::Bus& bus, std::int64_t cycle_ns) {
         if (cycle_ns == bus.setup.cycle_ns) return;

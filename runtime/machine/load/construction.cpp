@@ -204,17 +204,27 @@ bool declare_variable(const hal_host* host, const hal_variable* variable) {
 }
 constexpr hal_retained retained_extension{sizeof retained_extension, 0, declare_variable};
 
-constexpr hal_assumed assumed_extension{sizeof assumed_extension,
-                                        [](const hal_host* host, const char* name) {
+bool is_assumed(const hal_host* host, const char* name) {
     const Construction& c = construction_of(host);
     return c.edit != nullptr && c.edit->absences().is_assumed(name);
-}};
+}
+
+const char* argument_of_program(const hal_host* host, const char* program) {
+    const Construction& c = construction_of(host);
+    const std::string* const argument =
+        c.edit != nullptr ? c.edit->absences().argument_of(program) : nullptr;
+    return argument ? argument->c_str() : nullptr;
+}
+
+constexpr hal_assumed assumed_extension{sizeof assumed_extension, is_assumed};
+constexpr hal_unstarted unstarted_extension{sizeof unstarted_extension, argument_of_program};
 
 const void* extension_of(const hal_host* host, const char* id) {
     if (std::strcmp(id, "hal.faults/1") == 0) return construction_of(host).request.faults;
     if (std::strcmp(id, HAL_NAMING) == 0) return &naming_extension;
     if (std::strcmp(id, HAL_PIN_NAMES) == 0) return &pin_names_extension;
     if (std::strcmp(id, HAL_ASSUMED) == 0) return &assumed_extension;
+    if (std::strcmp(id, HAL_UNSTARTED) == 0) return &unstarted_extension;
     if (std::strcmp(id, HAL_RETAINED) == 0) return &retained_extension;
     if (std::strcmp(id, HAL_MODULES) == 0) return &modules_extension;
     if (std::strcmp(id, HAL_MODULE_CALLS) == 0) return &module_calls_extension;

@@ -21,6 +21,7 @@
 #include "hal/pin_names.h"
 #include "hal/retained.h"
 #include "hal/texts.h"
+#include "hal/unstarted.h"
 #include "machine/load/construct.hpp"
 
 namespace hal {
