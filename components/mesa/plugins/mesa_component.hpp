@@ -13,6 +13,7 @@
 #include "encoder_pins.hpp"
 #include "event_texts.hpp"
 #include "hal/reporter.hpp"
+#include "hal/retained.hpp"
 #include "input_pins.hpp"
 #include "loaded_card.hpp"
 #include "mesa/driver/card_monitor.hpp"
@@ -116,6 +117,10 @@ struct MesaComponent : LoadedCard, hal::bus::BusComponent {
         rewrites_ = rewrites_ || (monitor_.state() != before && !monitor_.drives_outputs());
         handle(event, now);
         if (is_fresh) {
+            // one behind a gap is checked by the position; of others, those that may have had a rate
+            if (monitor_.state() == CardState::configuring && shows_bite() && !is_after_gap_) {
+                lose_positions();
+            }
             receive(cycle, now);
         } else {
             ++missing_cycles_;
@@ -247,6 +252,10 @@ private:
         if (value <= 0) return cycle.period_ns() * 80 / 100;
         return value < 100 ? cycle.period_ns() * value / 100 : value;
     }
+    /// Returns whether the newest answer shows that the watchdog has bitten.
+    bool shows_bite() const noexcept {
+        return (link_->reply().at(watchdog_status_) & watchdog::has_bitten) != 0;
+    }
     CardReport report(bool is_fresh) const noexcept {
         CardReport report;
         report.is_fresh = is_fresh;
@@ -257,7 +266,7 @@ private:
         report.has_foreign_writes = link_->has_foreign_writes();
         report.is_reset =
             (reply.at(watchdog_timeout_) & watchdog::off) != 0 || link_->has_forgotten_count();
-        report.has_bitten = (reply.at(watchdog_status_) & watchdog::has_bitten) != 0;
+        report.has_bitten = shows_bite();
         return report;
     }
     /// Pins become outputs only behind an answer that is younger than the timeout of the watchdog
@@ -267,8 +276,7 @@ private:
         writing.period_s = cycle.seconds();
         writing.outputs_on = monitor_.drives_outputs();
         writing.may_set_outputs =
-            writing.outputs_on && is_fresh_ &&
-            (link_->reply().at(watchdog_status_) & watchdog::has_bitten) == 0 &&
+            writing.outputs_on && is_fresh_ && !shows_bite() &&
             link_->age_ns(cycle.start_ns()) < std::int64_t{timeout_ns_};
         writing.may_move = writing.outputs_on && ports_->modules_are_released();
         return writing;
@@ -350,7 +358,7 @@ private:
         reading.age_s = static_cast<double>(link_->age_ns(now)) * 1e-9;
         reading.is_after_gap = std::exchange(is_after_gap_, false);
         reading.gap_s = cycle.seconds() * std::exchange(missing_cycles_, 0U);
-        reading.has_bitten = (link_->reply().at(watchdog_status_) & watchdog::has_bitten) != 0;
+        reading.has_bitten = shows_bite();
         reading.has_lost_power = std::exchange(has_lost_power_, false);
         // no step generator has a rate before the timeout is confirmed
         const bool may_have_reset = std::exchange(may_have_reset_, false);
@@ -446,8 +454,8 @@ private:
     /// behind an answer that shows another value, and never on suspicion.
     void write_watchdog(Outgoing& out) noexcept {
         sent_timeout_ = watchdog_timeout(timeout_ns_, watchdog_clock_hz_);
-        if (monitor_.state() == CardState::configuring) {
-            out.put(watchdog_.at(watchdog::status), 0);
+        if (monitor_.state() == CardState::configuring && is_fresh_ && shows_bite()) {
+            out.put(watchdog_.at(watchdog::status), 0);  // a bite that nobody has seen stays there
         }
         const bool writes_timeout =
             is_fresh_ && link_->reply().at(watchdog_timeout_) != sent_timeout_;
@@ -459,8 +467,9 @@ private:
         }
         out.put(watchdog_.at(watchdog::reset), watchdog::reload);
     }
-    /// Everything off, and the watchdog bites at once: what the card has to do when nobody is
-    /// there. Built in advance, because it is sent in a crash handler as well.
+    /// Everything off: what the card has to do when nobody is there. Built in advance, because it is
+    /// sent in a crash handler as well. It does not make the watchdog bite: that register shows a
+    /// reset, also one whose answer was lost before.
     void build_stop() {
         stop_.clear();
         Outgoing out(stop_, true);
@@ -468,7 +477,6 @@ private:
             module->stop(out);
         }
         ports_->stop(out);
-        out.put(watchdog_.at(watchdog::timeout), watchdog::bite_now);
     }
     /// [any]
     void send_stop(std::int64_t now) noexcept { port_->send(stop_.bytes(), now); }
@@ -587,6 +595,7 @@ private:
 
     std::optional<CycleLink> link_;
     CardMonitor monitor_;
+    hal::Retained retained_{*this, {{"card", monitor_}}};
     std::unique_ptr<EventTexts> texts_;
     std::size_t unused_modules_ = 0;
     std::unique_ptr<hal::Reporter<EventRecord>> reporter_;

@@ -169,7 +169,7 @@ public:
         }
         has_begun_ = true;
         has_run_ = true;
-        if (reading.writes_arrived) {
+        if (reading.writes_arrived && is_rate_sent_) {
             possible_rate_ = rate_;
         }
         moved_ += rate_per_s() * reading.period_s;
@@ -244,6 +244,7 @@ public:
             out.put(mode_, mode());
         }
         out.put(rate_address_, static_cast<std::uint32_t>(rate_));
+        is_rate_sent_ = true;
         if (std::abs(std::int64_t{rate_}) > std::abs(std::int64_t{possible_rate_})) {
             possible_rate_ = rate_;
         }
@@ -255,6 +256,7 @@ public:
     void has_stopped() noexcept {
         stopped_rate_ = rate_ != 0 ? rate_ : stopped_rate_;
         rate_ = 0;
+        is_rate_sent_ = false;  // an answer does not confirm what stops everything
     }
     bool is_valid() const noexcept { return !is_lost_; }
     /// Returns whether it follows its enable again after it has lost its position. [realtime] read
@@ -367,6 +369,7 @@ private:
     double lost_ = 0.0;  ///< positions before resets of the card
     std::int64_t zero_ = 0;
     std::int32_t rate_ = 0;  ///< in the card
+    bool is_rate_sent_ = false;  ///< by writes that an answer confirms
     std::int32_t possible_rate_ = 0;  ///< the greatest one that the card may have
     std::int32_t stopped_rate_ = 0;  ///< when everything was stopped, until an answer confirms it
     bool needs_edge_ = false;  ///< it stands until its enable is FALSE
