@@ -10,7 +10,8 @@
 //
 // If they can match within this period, m is e, and the rate is the velocity of the command less
 // half of e per period. Otherwise the velocity changes by a for the period, in the direction after which |m| is
-// smaller.
+// smaller. Where the error is so great that m does not depend on that choice within the precision of a
+// number, its sign decides.
 #pragma once
 
 #include <algorithm>
@@ -21,20 +22,31 @@ namespace hal::mesa {
 class StepControl {
 public:
     struct Limits {
-        double velocity = 0.0;  ///< units/s; 0: none
+        double velocity = 0.0;  ///< units/s, reached within the acceleration; 0: none
         double acceleration = 0.0;  ///< units/s^2; 0: none
+        double possible = 0.0;  ///< units/s that are never exceeded; 0: none
     };
 
     /// Stands at a position: at a start and while disabled. [realtime]
     void hold(double command) noexcept {
-        command_ = command;
+        set_command(command);
         velocity_ = 0.0;
+    }
+    /// Returns the velocity of this period on the way to a standstill: there is no valid command.
+    /// [realtime]
+    double brake(double position, double period_s, const Limits& limits) noexcept {
+        const double velocity = follow_velocity(0.0, position, period_s, limits);
+        begins_anew_ = true;
+        return velocity;
     }
 
     /// Returns the velocity for this period in units/s. `position` is where the axis is when the new
     /// rate takes effect. [realtime]
     double follow_position(double command, double position, double period_s,
                            const Limits& limits) noexcept {
+        if (begins_anew_) {
+            set_command(command);  // its first value is not a movement
+        }
         feed_forward_ = (command - command_) / period_s;
         const double error = position - command_;
         command_ = command;
@@ -73,7 +85,16 @@ private:
     static double at_match(double error, double relative, double a, double period_s) noexcept {
         return error + relative * std::abs(relative) / (2.0 * a) - relative * period_s / 2.0;
     }
+    /// A command that is not a number is replaced by the next one that is followed.
+    void set_command(double command) noexcept {
+        begins_anew_ = !std::isfinite(command);
+        command_ = begins_anew_ ? 0.0 : command;
+    }
     double ramp(double error, double relative, double a, double period_s) const noexcept {
+        const double change = a * period_s;
+        const double fastest = std::abs(relative) + change;
+        const double near = fastest * fastest / a + 4.0 * fastest * period_s;
+        if (std::abs(error) > near) return velocity_ - std::copysign(change, error);
         const double towards = relative > 0.0 ? -a : a;
         const double away = -towards;
         const double later = relative + away * period_s;
@@ -81,16 +102,20 @@ private:
         const bool is_better = std::abs(away_match) < std::abs(error_at_match_);
         return velocity_ + (is_better ? away : towards) * period_s;
     }
+    /// A velocity above a lowered limit falls within the acceleration.
     double apply(double wanted, double period_s, const Limits& limits) noexcept {
         if (!std::isfinite(wanted)) {
             wanted = 0.0;
+        }
+        if (limits.velocity > 0.0) {
+            wanted = std::clamp(wanted, -limits.velocity, limits.velocity);
         }
         if (limits.acceleration > 0.0) {
             const double change = limits.acceleration * period_s;
             wanted = std::clamp(wanted, velocity_ - change, velocity_ + change);
         }
-        if (limits.velocity > 0.0) {
-            wanted = std::clamp(wanted, -limits.velocity, limits.velocity);
+        if (limits.possible > 0.0) {
+            wanted = std::clamp(wanted, -limits.possible, limits.possible);
         }
         velocity_ = wanted;
         return velocity_;
@@ -100,6 +125,7 @@ private:
     double velocity_ = 0.0;
     double feed_forward_ = 0.0;
     double error_at_match_ = 0.0;
+    bool begins_anew_ = false;  // the next command that is followed is not a movement
 };
 
 }  // namespace hal::mesa

@@ -19,6 +19,7 @@ enum class Event : std::uint8_t {
     contended,
     position_lost,
     positions_valid,
+    setting_waits,
     encoder_gap,
     remote_lost,
     remote_online,
@@ -51,6 +52,9 @@ inline constexpr bus::EventRow<Event> event_rows[] = {
      "axis; it moves again after enable was FALSE]",
      "; it stands until enable was FALSE"},
     {Event::positions_valid, bus::Effect::ends, "all step generators are released again"},
+    {Event::setting_waits, bus::Effect::none,
+     "stepgen {unit} runs: a changed position-scale, step_type or swap_step_dir applies once its "
+     "enable is FALSE"},
     {Event::encoder_gap, bus::Effect::none,
      "encoder {unit} may have lost counts while the card was lost; home the axis"},
     {Event::remote_lost, bus::Effect::raises,

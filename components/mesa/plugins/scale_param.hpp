@@ -11,8 +11,9 @@
 
 namespace hal::mesa {
 
-/// A scale. While its value is 0, NaN or infinite, the last valid one applies, 1 before there is
-/// one, and a fault is raised once: another factor would stop a motor at once, or move its position.
+/// A scale. While its value is 0, NaN, infinite or absurd, the last valid one applies, 1 before there
+/// is one, and a fault is raised once: another factor would stop a motor at once, or move its
+/// position.
 class ScaleParam : public hal::Param<double> {
 public:
     ScaleParam(hal::Component& component, const char* name, const char* doc,
@@ -20,11 +21,12 @@ public:
         : Param(component, name, doc, options),
           valid_(is_valid(options.initial) ? options.initial : 1.0),
           self_(&component),
-          fault_(std::string(name) + " is 0, NaN or infinite; its last valid value applies"),
+          fault_(std::string(name) +
+                 " is 0, NaN, or not within 1e-15 and 1e15; its last valid value applies"),
           faults_(hal::extension<hal_faults>("hal.faults/1")),
           retained_(component, {{name, valid_}, {name, is_reported_}}) {}
 
-    /// Returns the scale, which is neither 0 nor NaN nor infinite. [realtime]
+    /// Returns the scale, whose magnitude is within 1e-15 and 1e15. [realtime]
     double get() const noexcept {
         const double value = Param::get();
         if (!is_valid(value)) [[unlikely]]
@@ -36,7 +38,10 @@ public:
     operator double() const noexcept { return get(); }
 
 private:
-    static bool is_valid(double value) noexcept { return value != 0.0 && std::isfinite(value); }
+    static bool is_valid(double value) noexcept {
+        const double magnitude = std::abs(value);
+        return magnitude >= 1e-15 && magnitude <= 1e15;  // NaN is not
+    }
     double last_valid() const noexcept {
         if (!is_reported_ && faults_ != nullptr) {
             faults_->raise(faults_, self_, fault_.c_str(),

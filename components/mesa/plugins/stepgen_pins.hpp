@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "command_pin.hpp"
 #include "dpll_pins.hpp"
 #include "hal/limit.hpp"
 #include "hal/retained.hpp"
@@ -85,6 +86,17 @@ private:
     hal::In<bool> index_invert_, probe_invert_;
 };
 
+/// Times of the pulses of a step generator, in clocks. The card adds one to each.
+struct StepPulse {
+    std::uint32_t length = stepgen::max_time;
+    std::uint32_t space = stepgen::max_time;
+
+    /// Returns the highest rate, steps/s.
+    double highest_rate(std::uint32_t clock_hz) const noexcept {
+        return clock_hz / (length + space + 2.0);
+    }
+};
+
 /// One step generator. The card turns the last rate into steps until it gets another one, so between
 /// two readings the position is known as well:
 ///
@@ -101,10 +113,10 @@ public:
           space_(module.addresses.at(stepgen::pulse_space, unit)),
           setup_(module.addresses.at(stepgen::direction_setup, unit)),
           hold_(module.addresses.at(stepgen::direction_hold, unit)),
-          position_cmd_(o.component, o.write, named(unit, "position-cmd"),
-                        "commanded position, with control-type 0"),
-          velocity_cmd_(o.component, o.write, named(unit, "velocity-cmd"),
-                        "commanded velocity, with control-type 1"),
+          position_cmd_(o, named(unit, "position-cmd"), "commanded position, with control-type 0",
+                        "the step generator brakes"),
+          velocity_cmd_(o, named(unit, "velocity-cmd"), "commanded velocity, with control-type 1",
+                        "the step generator brakes"),
           enable_(o.component, o.write, named(unit, "enable"), "TRUE: steps are made"),
           control_type_(o.component, o.write, named(unit, "control-type"),
                         "FALSE: follows position-cmd; TRUE: velocity-cmd"),
@@ -118,9 +130,12 @@ public:
                           "FALSE: steps were made that the motor may not have followed; TRUE again "
                           "when enable becomes TRUE after it was FALSE",
                           {.initial = true, .safe = false}),
-          position_scale_(o.component, named(unit, "position-scale"), "steps per unit"),
-          maxvel_(o.component, named(unit, "maxvel"),
-                  "maximum velocity, units/s; 0: what the times of the pulses allow"),
+          position_scale_(o.component, named(unit, "position-scale"),
+                          "steps per unit; a change applies while enable is FALSE"),
+          maxvel_(
+              o.component, named(unit, "maxvel"),
+              "maximum velocity, units/s; 0: what the times of the pulses allow; above a lowered "
+              "one it brakes within maxaccel"),
           maxaccel_(o.component, named(unit, "maxaccel"),
                     "maximum acceleration, units/s2; 0: not limited", {.initial = 1.0}),
           steplen_(o.component, named(unit, "steplen"), "length of a pulse",
@@ -134,7 +149,8 @@ public:
                    "time from a pulse to a change of direction",
                    {.initial = slowest_ns(), .unit = "ns"}),
           step_type_(o.component, named(unit, "step_type"),
-                     "0: step and direction, 1: up and down, 2: quadrature"),
+                     "0: step and direction, 1: up and down, 2: quadrature; a change applies while "
+                     "enable is FALSE"),
           dbg_pos_minus_prev_cmd_(o.component, o.write, named(unit, "dbg_pos_minus_prev_cmd"),
                                   "position error of the control loop"),
           dbg_ff_vel_(o.component, o.write, named(unit, "dbg_ff_vel"), "velocity of position-cmd"),
@@ -169,6 +185,7 @@ public:
         }
         has_begun_ = true;
         has_run_ = true;
+        adopt_settings();
         if (reading.writes_arrived && is_rate_sent_) {
             possible_rate_ = rate_;
         }
@@ -200,6 +217,7 @@ public:
     }
     /// [realtime] read
     void miss(double period_s) noexcept {
+        adopt_settings();
         moved_ += rate_per_s() * period_s;
         if (latch_) {
             latch_->miss();
@@ -219,29 +237,33 @@ public:
     }
     /// Returns true once after the generator has run on while its outputs were off. [realtime] read
     bool take_run_on() noexcept { return std::exchange(has_run_on_, false); }
+    /// Returns true once after a setting has changed that waits until enable is FALSE. [realtime] read
+    bool take_waiting() noexcept { return std::exchange(waits_newly_, false); }
 
     /// [realtime] write
     void transmit(Outgoing& out, const Writing& writing) noexcept {
         if (!enable_) {
             needs_edge_ = false;
+            holds_settings_ = false;
         } else if (!needs_edge_) {
             is_lost_ = false;
         }
         const bool runs = writing.may_move && enable_ && !needs_edge_;
+        adopt_pulse(runs);
         if (runs) {
+            holds_settings_ = true;
             command(writing.period_s);
         } else {
-            rate_ = 0;
-            control_.hold(position_cmd_);
+            stand();
         }
-        out.put(length_, step_time(steplen_, clock_hz_));
-        out.put(space_, step_time(stepspace_, clock_hz_));
+        out.put(length_, pulse_.length);
+        out.put(space_, pulse_.space);
         out.put(setup_, step_time(dirsetup_, clock_hz_));
         out.put(hold_, step_time(dirhold_, clock_hz_));
         if (latch_) {
-            latch_->transmit(out, mode_.address(), mode());
+            latch_->transmit(out, mode_.address(), mode_bits_);
         } else {
-            out.put(mode_, mode());
+            out.put(mode_, mode_bits_);
         }
         out.put(rate_address_, static_cast<std::uint32_t>(rate_));
         is_rate_sent_ = true;
@@ -264,6 +286,8 @@ public:
 
 private:
     static constexpr std::uint32_t slowest_ns() { return 163'830; }  // 3FFFh at 100 MHz
+    /// Of a commanded position: the counter of the position has 2^47.
+    static constexpr double max_steps = 0x1p46;
 
     /// Valid until the next call.
     static const char* named(unsigned unit, const char* name) {
@@ -275,7 +299,7 @@ private:
     bool is_moving(std::int32_t rate) const noexcept {
         return std::abs(steps_per_s(rate, clock_hz_)) > 1.0;
     }
-    double scale() const noexcept { return position_scale_; }
+    double scale() const noexcept { return scale_; }
     /// Returns the rate in 1/65536 steps per second.
     double rate_per_s() const noexcept {
         return steps_per_s(rate_, clock_hz_) * accumulator_per_step;
@@ -286,17 +310,45 @@ private:
         const double whole = static_cast<double>(count - zero_);
         return (whole + lost_ + beyond) / accumulator_per_step / scale();
     }
-    double max_velocity() const noexcept {
-        const double clocks =
-            step_time(steplen_, clock_hz_) + step_time(stepspace_, clock_hz_) + 2.0;
-        const double hardware = clock_hz_ / clocks / std::abs(scale());
-        const double wanted = std::abs(maxvel_.get());
-        return wanted > 0.0 && wanted < hardware ? wanted : hardware;
+    StepControl::Limits limits() const noexcept {
+        const double steps_per_unit = std::abs(scale());
+        StepControl::Limits limits;
+        limits.velocity = wanted_pulse().highest_rate(clock_hz_) / steps_per_unit;
+        if (const double wanted = std::abs(maxvel_.get()); wanted > 0.0) {
+            limits.velocity = std::min(limits.velocity, wanted);
+        }
+        limits.acceleration = std::abs(maxaccel_.get());
+        limits.possible = pulse_.highest_rate(clock_hz_) / steps_per_unit;
+        return limits;
     }
 
-    std::uint32_t mode() const noexcept {
+    StepPulse wanted_pulse() const noexcept {
+        return {step_time(steplen_, clock_hz_), step_time(stepspace_, clock_hz_)};
+    }
+    /// Pulses that need more time wait until the generator has braked to the rate that they allow.
+    void adopt_pulse(bool runs) noexcept {
+        const StepPulse wanted = wanted_pulse();
+        const double rate = std::abs(steps_per_s(rate_, clock_hz_));
+        if (!runs || rate <= wanted.highest_rate(clock_hz_)) {
+            pulse_ = wanted;
+        }
+    }
+    std::uint32_t wanted_mode() const noexcept {
         const std::uint32_t type = std::min<std::uint32_t>(step_type_, 2);
         return swap_step_dir_ && *swap_step_dir_ ? type | stepgen::swap_step_direction : type;
+    }
+    /// Another scale would move the axis, or turn it around; another mode would turn its steps into
+    /// others. Both wait until enable is FALSE.
+    void adopt_settings() noexcept {
+        const double scale = position_scale_;
+        const std::uint32_t mode = wanted_mode();
+        const bool differs = scale != scale_ || mode != mode_bits_;
+        const bool waits = holds_settings_ && differs;
+        waits_newly_ = waits_newly_ || (waits && !waits_);
+        waits_ = waits;
+        if (waits) return;
+        scale_ = scale;
+        mode_bits_ = mode;
     }
     /// `value`: the accumulator of the answer that shows the event.
     void follow_latch(std::int32_t value, LatchSource source) noexcept {
@@ -330,14 +382,30 @@ private:
         return !std::exchange(needs_edge_, true);
     }
 
+    void stand() noexcept {
+        position_cmd_.ignore();
+        velocity_cmd_.ignore();
+        rate_ = 0;
+        control_.hold(position_cmd_);
+    }
+    double next_velocity(double at, double period_s, const StepControl::Limits& limits) noexcept {
+        if (control_type_) {
+            position_cmd_.ignore();
+            const auto velocity = velocity_cmd_.valid();
+            return velocity ? control_.follow_velocity(*velocity, at, period_s, limits)
+                            : control_.brake(at, period_s, limits);
+        }
+        velocity_cmd_.ignore();
+        const auto position = position_cmd_.valid(max_steps / std::abs(scale()));
+        return position ? control_.follow_position(*position, at, period_s, limits)
+                        : control_.brake(at, period_s, limits);
+    }
     void command(double period_s) noexcept {
         const double at = position();
-        const StepControl::Limits limits{max_velocity(), std::abs(maxaccel_.get())};
+        const StepControl::Limits limits = this->limits();
         const double before = control_.velocity();
         dbg_pos_minus_prev_cmd_ = at - control_.command();
-        const double velocity = control_type_
-                                    ? control_.follow_velocity(velocity_cmd_, at, period_s, limits)
-                                    : control_.follow_position(position_cmd_, at, period_s, limits);
+        const double velocity = next_velocity(at, period_s, limits);
         rate_ = step_rate(velocity * scale(), clock_hz_);
         control_.set_velocity(steps_per_s(rate_, clock_hz_) / scale());
         const double error = before - control_.feed_forward();
@@ -375,10 +443,16 @@ private:
     bool needs_edge_ = false;  ///< it stands until its enable is FALSE
     bool is_lost_ = false;  ///< until it is enabled again behind that
     bool has_run_on_ = false;
+    double scale_ = 1.0;  ///< that applies
+    std::uint32_t mode_bits_ = 0;  ///< that apply
+    StepPulse pulse_;  ///< that applies
+    bool holds_settings_ = false;  ///< it has run since enable was FALSE
+    bool waits_ = false;  ///< a changed setting
+    bool waits_newly_ = false;
     bool has_begun_ = false;
     bool has_run_ = false;  ///< also in the version before a reload
 
-    hal::In<double> position_cmd_, velocity_cmd_;
+    CommandPin position_cmd_, velocity_cmd_;
     hal::In<bool> enable_, control_type_, position_reset_;
     hal::Out<std::int32_t> counts_;
     hal::Out<double> position_fb_, velocity_fb_;
@@ -461,6 +535,11 @@ public:
     template <class Report>
     void take_run_on(Report&& report) noexcept {
         report_each(units_, &Stepgen::take_run_on, report);
+    }
+    /// The same for each one with a changed setting that waits until its enable is FALSE. [realtime]
+    template <class Report>
+    void take_waiting(Report&& report) noexcept {
+        report_each(units_, &Stepgen::take_waiting, report);
     }
     /// Another master has the card. Calls `report(unit)` as was_off() does. [realtime]
     template <class Report>
