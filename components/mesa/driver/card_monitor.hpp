@@ -110,6 +110,7 @@ private:
         return CardEvent::was_reset;
     }
     CardEvent contend(const CardReport& report, std::int64_t period_ns) noexcept {
+        if (report.is_reset && is_marked_) return lose_power();
         foreign_ns_ = report.has_foreign_writes ? 0 : foreign_ns_ + period_ns;
         if (foreign_ns_ >= quiet_ns) {
             configure();

@@ -24,6 +24,7 @@ enum class Event : std::uint8_t {
     remote_lost,
     remote_online,
     hold_too_long,
+    timeout_too_long,
     module_unused,
 };
 
@@ -37,7 +38,7 @@ inline constexpr bus::EventRow<Event> event_rows[] = {
     {Event::online, bus::Effect::ends, "{card} is online"},
     {Event::lost, bus::Effect::raises,
      "{card} is lost: no answer in {value} cycles[; check its power and its cable]",
-     "; its outputs are off"},
+     "; its watchdog switches its outputs off within watchdog.timeout_ns"},
     {Event::returned, bus::Effect::none, "{card} answers again; it is configured"},
     {Event::was_reset, bus::Effect::none, "{card} was reset; it is configured again"},
     {Event::bitten, bus::Effect::raises,
@@ -63,6 +64,10 @@ inline constexpr bus::EventRow<Event> event_rows[] = {
     {Event::hold_too_long, bus::Effect::none,
      "hold-cycles is {value} ms, longer than watchdog.timeout_ns: the watchdog of {card} bites "
      "before the card counts as lost; lower hold-cycles"},
+    {Event::timeout_too_long, bus::Effect::none,
+     "watchdog.timeout_ns is {value} ms, more than 20 ms longer than hold-cycles: the motors of "
+     "{card} "
+     "may run on for so long when it is lost; lower watchdog.timeout_ns"},
     {Event::module_unused, bus::Effect::none, "{card}: {module}"},
 };
 static_assert(bus::in_order(event_rows));

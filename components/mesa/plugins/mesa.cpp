@@ -43,8 +43,8 @@ generators are advanced to the present by the rates that the card has. With `rea
 first, other functions behind it, then `read`.
 
 A lost datagram costs the data of one cycle and is counted in `lost-requests`; step generators go on at their last rates. After more than `hold-cycles` cycles
-without an answer the card is lost: `online` is FALSE, a fault is recorded, and the card switches its outputs off by its own watchdog. A card that answers again is
-configured and runs within a few cycles. Where the motor may not have followed, `stepgen.NN.position-valid` is FALSE, and the step generator stands until its
+without an answer the card is lost: `online` is FALSE, a fault is recorded, and the card switches its outputs off by its own watchdog, within
+`watchdog.timeout_ns`. Until then motors may run: `velocity-fb` is the last velocity, and `position-valid` FALSE. A card that answers again is configured and runs within a few cycles. Where the motor may not have followed, `stepgen.NN.position-valid` is FALSE, and the step generator stands until its
 `enable` was FALSE. When the watchdog bites although the card is there, because a thread was too late, outputs stay off until `watchdog.has_bit` is set to FALSE.
 
 `clock=card` lets all threads follow the DPLL of the card. Not supported are SSI, BiSS, Fanuc and resolver inputs, UARTs, RC PWM and table-driven steps; a firmware with such

@@ -75,7 +75,7 @@ struct MesaComponent : LoadedCard, hal::bus::BusComponent {
     }
     void stop() noexcept {
         if (link_) {
-            send_stop(datagram::unclocked);
+            send_last_stop();
         }
         link_.reset();
         reporter_->stop();
@@ -99,12 +99,9 @@ struct MesaComponent : LoadedCard, hal::bus::BusComponent {
             is_after_gap_ = true;
             note_stop();
         }
-        if (turn == hal::bus::Turn::leaves) {
-            send_stop(now);
-            note_stop();
-        }
+        stop_unwritten(now);
         if (is_offline(turn)) {
-            show_offline();
+            show_offline(cycle.seconds());
             return;
         }
         link_->request(now);
@@ -131,6 +128,7 @@ struct MesaComponent : LoadedCard, hal::bus::BusComponent {
                 module->miss(cycle.seconds());
             }
         }
+        tell_waiting();
         follow_remotes();
         acknowledge();
         show(is_fresh);
@@ -142,8 +140,14 @@ struct MesaComponent : LoadedCard, hal::bus::BusComponent {
     }
 
     void write(hal::Cycle cycle) noexcept {
-        if (!link_ || !functions_.transmit(cycle)) return;
+        if (!link_) return;
         const std::int64_t now = cycle.start_ns();
+        if (!functions_.transmit(cycle)) {
+            stop_unread(cycle);
+            return;
+        }
+        unwritten_cycles_ = 0;
+        unread_cycles_ = 0;
         const bool requests = !std::exchange(requested_by_function_, false);
         const CardState state = monitor_.state();
         if (state == CardState::lost || state == CardState::contended) {
@@ -170,11 +174,15 @@ struct MesaComponent : LoadedCard, hal::bus::BusComponent {
 
     void make_safe(hal::Cycle) noexcept {
         if (!link_) return;
-        send_stop(datagram::unclocked);
+        send_last_stop();
         interrupt();
     }
 
 private:
+    static constexpr std::int64_t max_run_on_ns = 20'000'000;
+    static constexpr unsigned stop_copies = 3;  // of a datagram that nothing confirms
+    static constexpr unsigned max_hold = hal::FunctionPair::tolerated_cycles;
+
     // --- Declaration
 
     template <class Pins, class... Arguments>
@@ -239,6 +247,32 @@ private:
         return static_cast<std::uint16_t>(bits >> 48 | 1U);
     }
 
+    // --- Functions that do not run
+
+    /// Returns whether one function has run so often without the other one that the card is stopped.
+    /// The stop is repeated some times, because nothing confirms it.
+    bool is_to_stop(unsigned& cycles) noexcept {
+        const unsigned tolerated = std::min<std::uint32_t>(hold_cycles_, max_hold) + 1;
+        cycles = std::min(cycles + 1, tolerated + stop_copies + 1);
+        return cycles > tolerated && cycles <= tolerated + stop_copies &&
+               monitor_.state() != CardState::contended;
+    }
+    /// read runs, and write may not: nothing is commanded any more.
+    void stop_unwritten(std::int64_t now) noexcept {
+        if (!is_to_stop(unwritten_cycles_)) return;
+        send_stop(now);
+        note_stop();
+        lose_sight();
+    }
+    /// write runs, and read does not: nobody knows what the commands are about.
+    void stop_unread(hal::Cycle cycle) noexcept {
+        const bool is_alone = functions_.receive_is_late() &&
+                              reader_.load(std::memory_order_relaxed) == thread_of(cycle);
+        if (!is_alone || !is_to_stop(unread_cycles_)) return;
+        send_stop(cycle.start_ns());
+        interrupt();  // read notes it when it runs again
+    }
+
     // --- Reading
 
     /// The host gives all functions of a thread the same hal_cycle, and each thread another one.
@@ -275,20 +309,25 @@ private:
         Writing writing;
         writing.period_s = cycle.seconds();
         writing.outputs_on = monitor_.drives_outputs();
-        writing.may_set_outputs =
-            writing.outputs_on && is_fresh_ && !shows_bite() &&
-            link_->age_ns(cycle.start_ns()) < std::int64_t{timeout_ns_};
+        writing.may_set_outputs = writing.outputs_on && is_fresh_ && !shows_bite() &&
+                                  link_->age_ns(cycle.start_ns()) < std::int64_t{timeout_ns_};
         writing.may_move = writing.outputs_on && ports_->modules_are_released();
         return writing;
     }
-    /// Reports once that the outputs are off before the card counts as lost.
+    /// Reports once that the outputs are off before the card counts as lost, or long behind it.
     void check_hold(std::int64_t period_ns) noexcept {
         const std::int64_t hold_ns = period_ns * std::int64_t{hold_cycles_};
-        const bool is_too_long = hold_ns > std::int64_t{timeout_ns_};
+        const std::int64_t timeout_ns = timeout_ns_;
+        const bool is_too_long = hold_ns > timeout_ns;
         if (is_too_long && !holds_too_long_) {
             tell({Event::hold_too_long, 0, hold_ns / 1'000'000});
         }
         holds_too_long_ = is_too_long;
+        const bool runs_on = timeout_ns - hold_ns > max_run_on_ns;
+        if (runs_on && !runs_on_too_long_) {
+            tell({Event::timeout_too_long, 0, timeout_ns / 1'000'000});
+        }
+        runs_on_too_long_ = runs_on;
     }
     void handle(CardEvent event, std::int64_t now) noexcept {
         switch (event) {
@@ -304,6 +343,7 @@ private:
             hold_positions();
             send_stop(now);
             note_stop();
+            lose_sight();
             break;
         case CardEvent::returned: come_back({Event::returned}, monitor_.was_off(), false); break;
         case CardEvent::was_reset:
@@ -328,6 +368,14 @@ private:
         if (stepgens_ != nullptr) {
             stepgens_->hold();
         }
+    }
+    /// For the time in which the watchdog of the card has not bitten, if nothing else has arrived.
+    void lose_sight() noexcept {
+        if (stepgens_ == nullptr) return;
+        const double shown_ns =
+            watchdog_ns(link_->reply().at(watchdog_timeout_) & ~watchdog::off, watchdog_clock_hz_);
+        const auto wanted_ns = static_cast<double>(timeout_ns_.get());
+        stepgens_->lose_sight(std::max(shown_ns, wanted_ns) * 1e-9);
     }
     void lose_positions() noexcept {
         if (stepgens_ == nullptr) return;
@@ -387,6 +435,12 @@ private:
             });
         }
     }
+    void tell_waiting() noexcept {
+        if (stepgens_ == nullptr) return;
+        stepgens_->take_waiting([this](std::size_t unit) {
+            tell({Event::setting_waits, static_cast<std::uint32_t>(unit)});
+        });
+    }
     void acknowledge() noexcept {
         if (monitor_.state() == CardState::bitten && !has_bit_) {
             monitor_.acknowledge();
@@ -414,7 +468,11 @@ private:
             }
         }
     }
-    void show_offline() noexcept {
+    void show_offline(double period_s) noexcept {
+        if (stepgens_ != nullptr) {
+            stepgens_->miss(period_s);
+            positions_valid_ = stepgens_->positions_are_valid();
+        }
         online_ = false;
         packet_error_ = false;
         if (serial_ != nullptr) {
@@ -430,7 +488,8 @@ private:
         const std::int32_t change = is_error ? std::max(packet_error_increment_.get(), 1)
                                              : -std::max(packet_error_decrement_.get(), 0);
         packet_error_ = is_error;
-        packet_error_level_ = std::clamp(packet_error_level_ + change, 0, limit);
+        const std::int64_t level = std::int64_t{packet_error_level_} + change;
+        packet_error_level_ = static_cast<std::int32_t>(std::clamp<std::int64_t>(level, 0, limit));
         packet_error_exceeded_ = packet_error_level_ == limit;
         if (is_error) {
             packet_error_total_ = packet_error_total_ + 1;
@@ -480,6 +539,12 @@ private:
     }
     /// [any]
     void send_stop(std::int64_t now) noexcept { port_->send(stop_.bytes(), now); }
+    /// The last that is sent: nobody is there to repeat it when it is lost. [any]
+    void send_last_stop() noexcept {
+        for (unsigned n = 0; n < stop_copies; ++n) {
+            send_stop(datagram::unclocked);
+        }
+    }
     /// The card has stopped: in the thread of read.
     void note_stop() noexcept {
         for (const auto& module : modules_) {
@@ -610,6 +675,9 @@ private:
     bool may_have_reset_ = false;  // such a datagram had no answer
     bool was_lost_ = false;
     bool holds_too_long_ = false;
+    bool runs_on_too_long_ = false;
+    unsigned unwritten_cycles_ = 0;  // of read without write
+    unsigned unread_cycles_ = 0;  // of write without read
     bool is_after_gap_ = false;  // these three are for the next answer
     bool has_lost_power_ = false;
     bool is_after_reset_ = false;

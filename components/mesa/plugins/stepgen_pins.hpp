@@ -126,10 +126,12 @@ public:
           position_fb_(o.component, o.read, named(unit, "position-fb"),
                        "position, with fractions of steps"),
           velocity_fb_(o.component, o.read, named(unit, "velocity-fb"), "velocity", {.safe = 0.0}),
-          position_valid_(o.component, o.read, named(unit, "position-valid"),
-                          "FALSE: steps were made that the motor may not have followed; TRUE again "
-                          "when enable becomes TRUE after it was FALSE",
-                          {.initial = true, .safe = false}),
+          position_valid_(
+              o.component, o.read, named(unit, "position-valid"),
+              "FALSE: steps were made that the motor may not have followed, until "
+              "enable becomes TRUE after it was FALSE; also while the card is lost, unless "
+              "the motor stood",
+              {.initial = true, .safe = false}),
           position_scale_(o.component, named(unit, "position-scale"),
                           "steps per unit; a change applies while enable is FALSE"),
           maxvel_(
@@ -186,6 +188,11 @@ public:
         has_begun_ = true;
         has_run_ = true;
         adopt_settings();
+        if (reading.is_after_gap && !reading.is_after_reset) {
+            check_gap(reading.gap_s);
+        }
+        is_unseen_ = false;
+        unseen_run_s_ = 0.0;
         if (reading.writes_arrived && is_rate_sent_) {
             possible_rate_ = rate_;
         }
@@ -218,6 +225,7 @@ public:
     /// [realtime] read
     void miss(double period_s) noexcept {
         adopt_settings();
+        unseen_run_s_ = std::max(unseen_run_s_ - period_s, 0.0);
         moved_ += rate_per_s() * period_s;
         if (latch_) {
             latch_->miss();
@@ -226,6 +234,12 @@ public:
     }
     /// The card is lost: from here on its motor stops at an unknown time. [realtime] read
     void hold() noexcept { held_moved_ = moved_; }
+    /// No answers show what the card does: it may go on for `run_s`, until its watchdog bites.
+    /// [realtime] read
+    void lose_sight(double run_s) noexcept {
+        is_unseen_ = true;
+        unseen_run_s_ = run_s;
+    }
     /// The outputs of the card were off while it may have had a rate: the motor did not follow. Returns
     /// whether the position, which was valid, is lost by that. [realtime] read
     bool was_off() noexcept { return is_moving(possible_rate_) && lose_position(); }
@@ -280,7 +294,9 @@ public:
         rate_ = 0;
         is_rate_sent_ = false;  // an answer does not confirm what stops everything
     }
-    bool is_valid() const noexcept { return !is_lost_; }
+    bool is_valid() const noexcept {
+        return !is_lost_ && !(is_unseen_ && is_moving(possible_rate_));
+    }
     /// Returns whether it follows its enable again after it has lost its position. [realtime] read
     bool is_released() const noexcept { return !needs_edge_; }
 
@@ -365,6 +381,14 @@ private:
         }
     }
 
+    /// The accumulator of 32 bits tells where the motor is unless it may have wrapped.
+    void check_gap(double gap_s) noexcept {
+        constexpr double known_steps = 16384.0;
+        const double steps = std::abs(steps_per_s(possible_rate_, clock_hz_)) * gap_s;
+        if (steps < known_steps) return;
+        has_run_on_ = true;
+        lose_position();
+    }
     /// Where the outputs were switched off and the rate 0 has not arrived, the motor has stopped, and
     /// the accumulator has not. When it stopped is known to some cycles.
     void check_stop(std::int64_t beyond, double period_s) noexcept {
@@ -423,8 +447,9 @@ private:
         const double steps = position() * scale();
         counts_ = static_cast<std::int32_t>(static_cast<std::int64_t>(std::floor(steps)));
         position_fb_ = steps / scale();
-        velocity_fb_ = steps_per_s(rate_, clock_hz_) / scale();
-        position_valid_ = !is_lost_;
+        const std::int32_t rate = unseen_run_s_ > 0.0 ? possible_rate_ : rate_;
+        velocity_fb_ = steps_per_s(rate, clock_hz_) / scale();
+        position_valid_ = is_valid();
     }
 
     const std::uint32_t clock_hz_;
@@ -443,6 +468,8 @@ private:
     bool needs_edge_ = false;  ///< it stands until its enable is FALSE
     bool is_lost_ = false;  ///< until it is enabled again behind that
     bool has_run_on_ = false;
+    bool is_unseen_ = false;  ///< no answer since the card was lost
+    double unseen_run_s_ = 0.0;  ///< for so long it may go on
     double scale_ = 1.0;  ///< that applies
     std::uint32_t mode_bits_ = 0;  ///< that apply
     StepPulse pulse_;  ///< that applies
@@ -549,6 +576,11 @@ public:
     void hold() noexcept {
         for (const auto& unit : units_) {
             unit->hold();
+        }
+    }
+    void lose_sight(double run_s) noexcept {
+        for (const auto& unit : units_) {
+            unit->lose_sight(run_s);
         }
     }
     bool positions_are_valid() const noexcept {

@@ -78,6 +78,9 @@ public:
     /// safe. Only for transmit(). [realtime]
     bool receive_is_missing() const noexcept { return receive_is_missing_; }
 
+    /// Returns true while receive() has not run since the last cycle. Only for transmit(). [realtime]
+    bool receive_is_late() const noexcept { return receives_.is_late(); }
+
     /// Returns true while transmit() has not run for `tolerated_cycles`. Only for receive().
     /// [realtime]
     bool transmit_is_missing() const noexcept { return transmit_is_missing_; }
