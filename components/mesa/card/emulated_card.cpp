@@ -711,7 +711,13 @@ void EmulatedCard::write_pwm(unsigned reg, unsigned unit, std::uint32_t value) n
 }
 
 std::uint32_t EmulatedCard::read_bridge(unsigned reg, unsigned unit) const noexcept {
-    return reg == three_phase_pwm::enable ? bridges_[unit].enable() : 0;
+    const BridgeDriver& of = bridges_[unit];
+    switch (reg) {
+    case three_phase_pwm::value: return of.value;
+    case three_phase_pwm::enable: return of.enable();
+    case three_phase_pwm::setup: return of.setup;
+    default: return bridge_rate_;
+    }
 }
 
 void EmulatedCard::write_bridge(unsigned reg, unsigned unit, std::uint32_t value) noexcept {

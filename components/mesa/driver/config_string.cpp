@@ -84,8 +84,11 @@ ConfigString::Problem ConfigString::parse_item(std::string_view item, std::size_
     const std::size_t equals = std::min(item.find('='), item.size());
     const std::string_view key = item.substr(0, equals);
     const std::string_view value = item.substr(std::min(equals + 1, item.size()));
-    if (item == "enable_raw") {
-        enable_raw_ = true;
+    if (key == "enable_raw") {
+        if (item != key && value != "0" && value != "1") {
+            problem.text = "invalid enable_raw " + quoted(value) + "; write 1, or 0 for none";
+        }
+        enable_raw_ = value != "0";
         return problem;
     }
     if (key == "firmware") {

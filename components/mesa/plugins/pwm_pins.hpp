@@ -2,9 +2,11 @@
 // PWM generators.
 #pragma once
 
-#include <cmath>
+#include <algorithm>
+#include <optional>
 #include <vector>
 
+#include "command_pin.hpp"
 #include "mesa/hostmot2/formulas.hpp"
 #include "mesa/hostmot2/registers.hpp"
 #include "module_pins.hpp"
@@ -18,7 +20,7 @@ public:
         : value_address_(module.addresses.at(pwm::value, unit)),
           mode_(module.addresses.at(pwm::mode, unit)),
           has_dither_(module.descriptor.version >= 1),
-          value_(o.component, o.write, named(unit, "value"), "commanded value"),
+          value_(o, named(unit, "value"), "commanded value", "the output is off"),
           enable_(o.component, o.write, named(unit, "enable"), "TRUE: the output is on"),
           offset_mode_(o.component, o.write, named(unit, "offset-mode"),
                        "TRUE: a value of 0 is a duty cycle of 50 %"),
@@ -31,13 +33,21 @@ public:
                        "and PWM",
                        {.initial = 1}) {}
 
-    /// `bits`: resolution of PWM. Returns whether the output is on. [realtime] write
-    bool transmit(Outgoing& out, const Writing& writing, unsigned bits) noexcept {
-        const bool is_on = writing.outputs_on && enable_;
+    /// Rates of all generators.
+    struct Rates {
+        PwmRate pwm;
+        std::uint32_t pdm = 0;
+    };
+    /// Returns whether the output is on. [realtime] write
+    bool transmit(Outgoing& out, const Writing& writing, const Rates& rates) noexcept {
         const bool is_pdm = output_type_ == 3;
-        const unsigned used_bits = is_pdm ? 12 : bits;
-        out.put(mode_, mode(used_bits));
-        out.put(value_address_, is_on ? pwm_value(duty(), used_bits) : 0);
+        const unsigned bits = is_pdm ? 12 : rates.pwm.bits;
+        const std::optional<double> duty = wanted_duty(writing);
+        // without a frequency the output would keep its level
+        const bool has_rate = (is_pdm ? rates.pdm : rates.pwm.rate) != 0;
+        const bool is_on = duty.has_value() && has_rate;
+        out.put(mode_, mode(bits));
+        out.put(value_address_, is_on ? pwm_value(*duty, bits) : 0);
         return is_on;
     }
     /// [setup]
@@ -47,11 +57,16 @@ private:
     static const char* named(unsigned unit, const char* name) {
         return brief_name("pwmgen.%02u.%s", unit, name);
     }
-    double duty() const noexcept {
+    /// Returns the duty cycle; nothing: the output is off.
+    std::optional<double> wanted_duty(const Writing& writing) noexcept {
         const double by = scale_;
-        double duty = value_ / by;
-        if (!std::isfinite(duty)) return 0.0;
-        duty = std::clamp(duty, -1.0, 1.0);
+        if (!writing.outputs_on || !enable_) {
+            value_.ignore();
+            return {};
+        }
+        const std::optional<double> value = value_.valid();
+        if (!value) return {};
+        const double duty = std::clamp(*value / by, -1.0, 1.0);
         return offset_mode_ ? (duty + 1.0) / 2.0 : duty;
     }
     std::uint32_t mode(unsigned bits) const noexcept {
@@ -71,7 +86,7 @@ private:
     const std::uint16_t value_address_;
     Setting mode_;
     const bool has_dither_;
-    hal::In<double> value_;
+    CommandPin value_;
     hal::In<bool> enable_, offset_mode_, dither_;
     ScaleParam scale_;
     hal::Param<std::int32_t> output_type_;
@@ -84,21 +99,24 @@ public:
           pwm_rate_(module.addresses.at(pwm::pwm_rate)),
           pdm_rate_(module.addresses.at(pwm::pdm_rate)),
           enables_(module.addresses.at(pwm::enables)),
-          pwm_frequency_(o.component, "pwmgen.pwm_frequency", "frequency of PWM",
+          pwm_frequency_(o.component, "pwmgen.pwm_frequency",
+                         "frequency of PWM; 0: the outputs are off",
                          {.initial = 20'000, .unit = "Hz"}),
-          pdm_frequency_(o.component, "pwmgen.pdm_frequency", "pulses per second of PDM",
+          pdm_frequency_(o.component, "pwmgen.pdm_frequency",
+                         "pulses per second of PDM; 0: the outputs are off",
                          {.initial = 20'000, .unit = "Hz"}) {
         units_ = make_units<PwmGenerator>(o, module);
     }
 
     void transmit(Outgoing& out, const Writing& writing) noexcept override {
         if (units_.empty()) return;
-        const PwmRate rate = hal::mesa::pwm_rate(pwm_frequency_, clock_hz_);
-        out.put(pwm_rate_, rate.rate);
-        out.put(pdm_rate_, hal::mesa::pdm_rate(pdm_frequency_, clock_hz_));
+        const PwmGenerator::Rates rates{hal::mesa::pwm_rate(pwm_frequency_, clock_hz_),
+                                        hal::mesa::pdm_rate(pdm_frequency_, clock_hz_)};
+        out.put(pwm_rate_, rates.pwm.rate);
+        out.put(pdm_rate_, rates.pdm);
         std::uint32_t enables = 0;
         for (std::size_t n = 0; n < units_.size(); ++n) {
-            const bool is_on = units_[n]->transmit(out, writing, rate.bits);
+            const bool is_on = units_[n]->transmit(out, writing, rates);
             enables |= is_on ? 1U << n : 0U;
         }
         out.put(enables_, enables);

@@ -5,8 +5,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <vector>
 
+#include "command_pin.hpp"
+#include "hal/limit.hpp"
 #include "mesa/driver/position_counter.hpp"
 #include "mesa/driver/remote.hpp"
 #include "module_pins.hpp"
@@ -42,7 +45,7 @@ public:
             *bits_not_[n] = !level;
         }
         if (number_out_) {
-            *number_out_ = number(raw);
+            show_number(number(raw));
         }
         if (count_) {
             receive_encoder(raw, is_after_gap);
@@ -55,8 +58,8 @@ public:
             const bool is_inverted = n < inverts_.size() && *inverts_[n];
             raw |= *bits_in_[n] != is_inverted ? std::uint64_t{1} << n : 0;
         }
-        if (is_on && number_in_) {
-            raw = raw_of(*number_in_);
+        if (number_in_) {
+            raw = number_raw(is_on);
         }
         if (field_.record.bits != 0) {
             smart_serial::put_bits(words, field_.bit, field_.record.bits, raw);
@@ -94,24 +97,23 @@ private:
         const bool has_range = r.min != r.max;
         const double max = has_range ? r.max : 1.0;
         const double min = has_range ? r.min : 0.0;
-        scale_max_ = place<hal::Param<double>>(o.component, (name + "-scalemax").c_str(),
-                                               "value of the largest number",
-                                               hal::PinOptions<double>{.initial = max});
+        scale_max_ = place<ScaleParam>(o.component, (name + "-scalemax").c_str(),
+                                       "value of the largest number",
+                                       hal::PinOptions<double>{.initial = max});
         if (!is_output) {
             number_out_ = place<hal::Out<double>>(
                 o.component, o.read, name.c_str(), "input of the device",
                 hal::PinOptions<double>{.unit = field_.record.unit.c_str()});
             return;
         }
-        number_in_ =
-            place<hal::In<double>>(o.component, o.write, name.c_str(), "output of the device",
-                                   hal::PinOptions<double>{.unit = field_.record.unit.c_str()});
+        number_in_ = place<CommandPin>(o, name.c_str(), "output of the device", "the output is 0",
+                                       hal::PinOptions<double>{.unit = field_.record.unit.c_str()});
         max_limit_ =
-            place<hal::Param<double>>(o.component, (name + "-maxlim").c_str(), "largest value",
-                                      hal::PinOptions<double>{.initial = max});
+            place<hal::LimitParam>(o.component, (name + "-maxlim").c_str(), "largest value",
+                                   hal::PinOptions<double>{.initial = max});
         min_limit_ =
-            place<hal::Param<double>>(o.component, (name + "-minlim").c_str(), "smallest value",
-                                      hal::PinOptions<double>{.initial = min});
+            place<hal::LimitParam>(o.component, (name + "-minlim").c_str(), "smallest value",
+                                   hal::PinOptions<double>{.initial = min});
     }
     void declare_encoder(const PinOwner& o, const std::string& name, bool is_output) {
         if (is_output) return;
@@ -150,13 +152,26 @@ private:
         const auto value = static_cast<std::int64_t>(raw << unused) >> unused;
         return static_cast<double>(value) * *scale_max_ / full_scale();
     }
+    /// A device may send a number that is none.
+    void show_number(double value) noexcept {
+        if (std::isfinite(value)) {
+            *number_out_ = value;
+        }
+    }
+    std::uint64_t number_raw(bool is_on) const noexcept {
+        if (!is_on) {
+            number_in_->ignore();
+            return 0;
+        }
+        const std::optional<double> value = number_in_->valid();
+        return value ? raw_of(*value) : 0;
+    }
     std::uint64_t raw_of(double value) const noexcept {
-        if (!std::isfinite(value)) return 0;
         const double low = std::min(min_limit_->get(), max_limit_->get());
         const double high = std::max(min_limit_->get(), max_limit_->get());
         const double limited = std::clamp(value, low, high);
         if (is_float()) return std::bit_cast<std::uint32_t>(static_cast<float>(limited));
-        const double scale = *scale_max_ == 0.0 ? 1.0 : scale_max_->get();
+        const double scale = *scale_max_;
         const double bottom = is_signed() ? -full_scale() : 0.0;
         // downwards, as LinuxCNC's driver does: 50 of 100 is 7Fh in 8 bits
         const double raw =
@@ -184,10 +199,10 @@ private:
     std::vector<Placed<hal::In<bool>>> bits_in_;
     std::vector<Placed<hal::Param<bool>>> inverts_;
     std::vector<Placed<hal::Out<bool>>> bits_out_, bits_not_;
-    Placed<hal::In<double>> number_in_;
+    Placed<CommandPin> number_in_;
     Placed<hal::Out<double>> number_out_;
-    Placed<hal::Param<double>> scale_max_, max_limit_, min_limit_;
-    Placed<ScaleParam> scale_;
+    Placed<hal::LimitParam> max_limit_, min_limit_;
+    Placed<ScaleParam> scale_max_, scale_;
     Placed<hal::Out<std::int32_t>> count_, raw_count_;
     Placed<hal::Out<double>> position_;
     Placed<hal::In<bool>> reset_;

@@ -2,8 +2,11 @@
 // Three-phase PWM: the six gates of a motor bridge.
 #pragma once
 
+#include <algorithm>
 #include <vector>
 
+#include "command_pin.hpp"
+#include "hal/limit.hpp"
 #include "mesa/driver/bridge_enable.hpp"
 #include "mesa/hostmot2/formulas.hpp"
 #include "mesa/hostmot2/registers.hpp"
@@ -19,9 +22,9 @@ public:
           value_address_(module.addresses.at(three_phase_pwm::value, unit)),
           enable_address_(module.addresses.at(three_phase_pwm::enable, unit)),
           setup_(module.addresses.at(three_phase_pwm::setup, unit)),
-          a_(o.component, o.write, named(unit, "A-value"), "command of phase A"),
-          b_(o.component, o.write, named(unit, "B-value"), "command of phase B"),
-          c_(o.component, o.write, named(unit, "C-value"), "command of phase C"),
+          a_(o, named(unit, "A-value"), "command of phase A", reaction),
+          b_(o, named(unit, "B-value"), "command of phase B", reaction),
+          c_(o, named(unit, "C-value"), "command of phase C", reaction),
           enable_(o.component, o.write, named(unit, "enable"),
                   "TRUE: the bridge is on, unless the fault input has switched it off; FALSE, then "
                   "TRUE: on again after a fault"),
@@ -45,13 +48,13 @@ public:
     }
     /// `rate`: that of all generators. [realtime] write
     void transmit(Outgoing& out, const Writing& writing, std::uint32_t rate) noexcept {
-        const double by = scale_;
         std::uint32_t setup = three_phase_dead_time(dead_time_, rate, clock_hz_);
         setup |= fault_invert_ ? three_phase_pwm::fault_on_high : 0;
         setup |= three_phase_sample(sample_time_) << three_phase_pwm::sample_shift;
         out.put(setup_, setup);
-        out.put(value_address_, three_phase_value(a_ / by, b_ / by, c_ / by));
-        if (const auto enable = bridge_.transmit(enable_, writing.outputs_on)) {
+        out.put(value_address_, value());
+        // without a frequency the gates would keep their levels
+        if (const auto enable = bridge_.transmit(enable_, writing.outputs_on && rate != 0)) {
             out.put(enable_address_, *enable);
         }
     }
@@ -62,16 +65,33 @@ private:
     static const char* named(unsigned unit, const char* name) {
         return brief_name("3pwmgen.%02u.%s", unit, name);
     }
+    /// Without one of the commands no phase has a voltage against another.
+    std::uint32_t value() noexcept {
+        const double by = scale_;
+        if (!enable_) {
+            a_.ignore();
+            b_.ignore();
+            c_.ignore();
+            return three_phase_value(0.0, 0.0, 0.0);
+        }
+        const auto a = a_.valid();
+        const auto b = b_.valid();
+        const auto c = c_.valid();
+        if (!a || !b || !c) return three_phase_value(0.0, 0.0, 0.0);
+        const auto duty = [by](double command) { return std::clamp(command / by, -1.0, 1.0); };
+        return three_phase_value(duty(*a), duty(*b), duty(*c));
+    }
+    static constexpr const char* reaction = "all phases have a duty cycle of 50 %";
 
     const std::uint32_t clock_hz_;
     const std::uint16_t value_address_, enable_address_;
     Setting setup_;
     BridgeEnable bridge_;
-    hal::In<double> a_, b_, c_;
+    CommandPin a_, b_, c_;
     hal::In<bool> enable_;
     hal::Out<bool> fault_;
     ScaleParam scale_;
-    hal::Param<double> dead_time_;
+    hal::LimitParam dead_time_;
     hal::Param<bool> fault_invert_;
     hal::Param<double> sample_time_;
 };
@@ -83,7 +103,7 @@ public:
           clock_hz_(module.clock_hz),
           rate_(module.addresses.at(three_phase_pwm::rate)),
           units_(make_units<ThreePhaseGenerator>(o, module)),
-          frequency_(o.component, "3pwmgen.frequency", "frequency of PWM",
+          frequency_(o.component, "3pwmgen.frequency", "frequency of PWM; 0: the bridges are off",
                      {.initial = 20'000, .unit = "Hz"}) {}
 
     void plan(ReadLayout& layout) override {

@@ -38,6 +38,11 @@ TEST(ConfigString, Parses_the_items_of_hostmot2) {
     EXPECT_EQ(config.count(Tag::pwm), ConfigString::all);
     EXPECT_EQ(config.count(Tag::led), ConfigString::all);
     EXPECT_TRUE(config.enable_raw());
+    ConfigString numbered;
+    EXPECT_EQ(numbered.parse("enable_raw=1").text, "");
+    EXPECT_TRUE(numbered.enable_raw());
+    EXPECT_EQ(numbered.parse("enable_raw=0").text, "");
+    EXPECT_FALSE(numbered.enable_raw());
     EXPECT_EQ(config.serial_mode(0, 0), 0);
     EXPECT_EQ(config.serial_mode(0, 1), 1);
     EXPECT_EQ(config.serial_mode(0, 2), -1);
@@ -54,6 +59,7 @@ TEST(ConfigString, Names_what_is_wrong) {
               "num_pwmgens=N, sserial_port_0=MODES and their like; see: hal doc mesa");
     EXPECT_EQ(problem_of("num_stepgens=x"),
               "invalid number 'x' of num_stepgens; write how many are used, or -1 for all");
+    EXPECT_EQ(problem_of("enable_raw=x"), "invalid enable_raw 'x'; write 1, or 0 for none");
     EXPECT_EQ(problem_of("num_oneshots=2"),
               "num_oneshots=2: this driver does not support the module; LinuxCNC's driver does: "
               "loadrt --linuxcnc hm2_eth");
@@ -462,6 +468,41 @@ TEST(StepControl, Reaches_a_step_of_the_command_without_a_limit_cycle) {
     EXPECT_NEAR(axis.control.velocity(), 0.0, 1e-6);
 }
 
+TEST(StepControl, Falls_below_a_lowered_limit_within_its_acceleration) {
+    StepControl control;
+    StepControl::Limits limits{50.0, 1000.0};
+    control.set_velocity(50.0);
+    limits.velocity = 5.0;
+    EXPECT_DOUBLE_EQ(control.follow_velocity(50.0, 0.0, 0.001, limits), 49.0);
+    EXPECT_DOUBLE_EQ(control.follow_position(1e3, 0.0, 0.001, limits), 48.0);
+    limits.possible = 30.0;
+    EXPECT_DOUBLE_EQ(control.follow_velocity(50.0, 0.0, 0.001, limits), 30.0);
+}
+
+TEST(StepControl, Approaches_a_command_that_is_far_away) {
+    for (const double far : {1e6, 1e12, 1e18, 1e30}) {
+        for (const double sign : {1.0, -1.0}) {
+            Axis axis(500.0);
+            for (int n = 0; n < 300; ++n) {
+                axis.follow(sign * far);
+            }
+            EXPECT_DOUBLE_EQ(axis.control.velocity(), sign * 100.0) << far;
+        }
+    }
+}
+
+TEST(StepControl, Does_not_take_the_first_command_behind_an_invalid_one_for_a_movement) {
+    StepControl control;
+    const StepControl::Limits limits{50.0, 1000.0};
+    control.hold(std::nan(""));
+    control.follow_position(7.0, 7.0, 0.001, limits);
+    EXPECT_DOUBLE_EQ(control.velocity(), 0.0);
+    control.brake(7.0, 0.001, limits);
+    control.follow_position(7.0001, 7.0, 0.001, limits);
+    EXPECT_DOUBLE_EQ(control.feed_forward(), 0.0);
+    EXPECT_NEAR(control.velocity(), 0.05, 1e-9);
+}
+
 TEST(StepControl, Follows_a_velocity_within_its_limits) {
     StepControl control;
     const StepControl::Limits limits{5.0, 1000.0};
@@ -614,6 +655,13 @@ TEST_F(MonitorTest, Leaves_a_card_to_another_master_until_that_has_stopped) {
     for (int n = 0; n < 999; ++n) {
         good();
     }
+    EXPECT_EQ(monitor.state(), CardState::configuring);
+}
+
+TEST_F(MonitorTest, Recognises_a_reset_while_another_master_writes) {
+    go_online();
+    EXPECT_EQ(with(true, false, true), CardEvent::contended);
+    EXPECT_EQ(with(true, false, true), CardEvent::was_reset);
     EXPECT_EQ(monitor.state(), CardState::configuring);
 }
 
