@@ -66,8 +66,7 @@ inline constexpr bus::EventRow<Event> event_rows[] = {
      "before the card counts as lost; lower hold-cycles"},
     {Event::timeout_too_long, bus::Effect::none,
      "watchdog.timeout_ns is {value} ms, more than 20 ms longer than hold-cycles: the motors of "
-     "{card} "
-     "may run on for so long when it is lost; lower watchdog.timeout_ns"},
+     "{card} may run on for that time when it is lost; lower watchdog.timeout_ns"},
     {Event::module_unused, bus::Effect::none, "{card}: {module}"},
 };
 static_assert(bus::in_order(event_rows));

@@ -97,8 +97,10 @@ struct MesaComponent : LoadedCard, hal::bus::BusComponent {
             monitor_.restart();
             link_->restart();
             is_after_gap_ = true;
+            pause_ns_ += std::max<std::int64_t>(now - last_read_ns_, 0);
             note_stop();
         }
+        last_read_ns_ = now;
         stop_unwritten(now);
         if (is_offline(turn)) {
             show_offline(cycle.seconds());
@@ -406,6 +408,7 @@ private:
         reading.age_s = static_cast<double>(link_->age_ns(now)) * 1e-9;
         reading.is_after_gap = std::exchange(is_after_gap_, false);
         reading.gap_s = cycle.seconds() * std::exchange(missing_cycles_, 0U);
+        reading.pause_s = static_cast<double>(std::exchange(pause_ns_, 0)) * 1e-9;
         reading.has_bitten = shows_bite();
         reading.has_lost_power = std::exchange(has_lost_power_, false);
         // no step generator has a rate before the timeout is confirmed
@@ -667,6 +670,8 @@ private:
     hal::LastingFault link_fault_, position_fault_;
     std::vector<hal::LastingFault> remote_faults_;
     unsigned missing_cycles_ = 0;  // before the next answer
+    std::int64_t last_read_ns_ = 0;
+    std::int64_t pause_ns_ = 0;  // of read, before the next answer
     bool rewrites_ = true;  // all settings are written
     std::atomic<const void*> reader_{nullptr};  // the thread of read; written by it
     bool requested_by_function_ = false;

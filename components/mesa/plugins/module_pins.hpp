@@ -28,6 +28,7 @@ struct Reading {
     double age_s = 0.0;  ///< of the answer, until now
     bool is_after_gap = false;  ///< the card was lost, or the thread stopped, before this answer
     double gap_s = 0.0;  ///< how long the card was lost
+    double pause_s = 0.0;  ///< how long the thread stood, or read was not in it
     bool has_bitten = false;  ///< its outputs are off
     bool has_lost_power = false;  ///< all registers begin anew
     bool is_after_reset = false;  ///< outputs were off: step generators do not continue

@@ -152,7 +152,7 @@ private:
         const auto value = static_cast<std::int64_t>(raw << unused) >> unused;
         return static_cast<double>(value) * *scale_max_ / full_scale();
     }
-    /// A device may send a number that is none.
+    /// A device may send NaN; it is not shown.
     void show_number(double value) noexcept {
         if (std::isfinite(value)) {
             *number_out_ = value;

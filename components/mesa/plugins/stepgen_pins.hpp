@@ -188,9 +188,8 @@ public:
         has_begun_ = true;
         has_run_ = true;
         adopt_settings();
-        if (reading.is_after_gap && !reading.is_after_reset) {
-            check_gap(reading.gap_s);
-        }
+        const double unseen_s = reading.gap_s + reading.pause_s;
+        const bool may_have_wrapped = possible_steps(unseen_s) >= known_steps;
         is_unseen_ = false;
         unseen_run_s_ = 0.0;
         if (reading.writes_arrived && is_rate_sent_) {
@@ -212,7 +211,8 @@ public:
             const std::int64_t beyond = counter_.update(value, expected) - before - expected;
             moved_ = since_reading;
             held_moved_ = 0.0;
-            if (is_known && reading.is_after_gap && reading.has_bitten && rate_ == 0) {
+            const bool is_in_doubt = reading.has_bitten || may_have_wrapped;
+            if (is_known && reading.is_after_gap && is_in_doubt && rate_ == 0) {
                 check_stop(beyond, reading.period_s);
             }
         }
@@ -304,6 +304,8 @@ private:
     static constexpr std::uint32_t slowest_ns() { return 163'830; }  // 3FFFh at 100 MHz
     /// Of a commanded position: the counter of the position has 2^47.
     static constexpr double max_steps = 0x1p46;
+    /// Of an accumulator between two answers: it has 2^16.
+    static constexpr double known_steps = 16384.0;
 
     /// Valid until the next call.
     static const char* named(unsigned unit, const char* name) {
@@ -381,16 +383,13 @@ private:
         }
     }
 
-    /// The accumulator of 32 bits tells where the motor is unless it may have wrapped.
-    void check_gap(double gap_s) noexcept {
-        constexpr double known_steps = 16384.0;
-        const double steps = std::abs(steps_per_s(possible_rate_, clock_hz_)) * gap_s;
-        if (steps < known_steps) return;
-        has_run_on_ = true;
-        lose_position();
+    /// Returns the steps that the card may have made in a time without an answer.
+    double possible_steps(double unseen_s) const noexcept {
+        return std::abs(steps_per_s(possible_rate_, clock_hz_)) * unseen_s;
     }
     /// Where the outputs were switched off and the rate 0 has not arrived, the motor has stopped, and
-    /// the accumulator has not. When it stopped is known to some cycles.
+    /// the accumulator has not. When it stopped is known to some cycles. Where they were not, the
+    /// motor has followed, but the accumulator of 32 bits may have wrapped.
     void check_stop(std::int64_t beyond, double period_s) noexcept {
         const double per_cycle =
             steps_per_s(stopped_rate_, clock_hz_) * accumulator_per_step * period_s;
@@ -469,7 +468,7 @@ private:
     bool is_lost_ = false;  ///< until it is enabled again behind that
     bool has_run_on_ = false;
     bool is_unseen_ = false;  ///< no answer since the card was lost
-    double unseen_run_s_ = 0.0;  ///< for so long it may go on
+    double unseen_run_s_ = 0.0;  ///< how long it may go on
     double scale_ = 1.0;  ///< that applies
     std::uint32_t mode_bits_ = 0;  ///< that apply
     StepPulse pulse_;  ///< that applies
