@@ -9,6 +9,9 @@
 //     |   +-------------------------------+ (1 s without a change of it)               |
 //     +--------------------------------------------------------------------------------+
 //
+// A bite that nobody has acknowledged outlasts a loss, a reset and a restart: they lead to `bitten`
+// in place of `configuring`.
+//
 // Outputs follow their pins in `online` only. Values are read in all states with an answer.
 #pragma once
 
@@ -53,18 +56,20 @@ public:
     unsigned missing() const noexcept { return missing_; }
     /// Returns whether the card was reset, or has bitten, since it was online: its outputs were off.
     bool was_off() const noexcept { return was_off_; }
+    /// Returns whether outputs stay off until a bite is acknowledged, in whatever state.
+    bool awaits_acknowledgment() const noexcept { return awaits_acknowledgment_; }
 
     /// Begins anew: after a start, or a stop of the thread.
     void restart() noexcept {
-        state_ = CardState::configuring;
         missing_ = 0;
         foreign_ns_ = 0;
-        has_written_ = false;
+        begin();
     }
     /// A bite was acknowledged.
     void acknowledge() noexcept {
+        awaits_acknowledgment_ = false;
         if (state_ == CardState::bitten) {
-            configure();
+            begin();
         }
     }
     /// Follows the answers of a cycle. `tolerated` is the number of missing answers in a row that
@@ -77,7 +82,7 @@ public:
         case CardState::contended: return contend(report, period_ns);
         case CardState::configuring: return confirm(report);
         case CardState::online: return supervise(report);
-        case CardState::bitten: return report.is_reset ? lose_power() : CardEvent::none;
+        case CardState::bitten: return watch_power(report);
         }
         return CardEvent::none;
     }
@@ -85,8 +90,9 @@ public:
 private:
     static constexpr std::int64_t quiet_ns = 1'000'000'000;
 
-    void configure() noexcept {
-        state_ = CardState::configuring;
+    /// Everything is written to the card, and its outputs go on unless a bite keeps them off.
+    void begin() noexcept {
+        state_ = awaits_acknowledgment_ ? CardState::bitten : CardState::configuring;
         has_written_ = false;
     }
     CardEvent miss(unsigned tolerated) noexcept {
@@ -100,28 +106,32 @@ private:
     CardEvent come_back(const CardReport& report) noexcept {
         was_off_ = report.is_reset || report.has_bitten;
         is_marked_ = !report.is_reset;
-        configure();
+        begin();
         return report.is_reset ? CardEvent::was_reset : CardEvent::returned;
     }
     CardEvent lose_power() noexcept {
         was_off_ = true;
         is_marked_ = false;
-        configure();
+        begin();
         return CardEvent::was_reset;
+    }
+    CardEvent watch_power(const CardReport& report) noexcept {
+        if (report.is_reset && is_marked_) return lose_power();
+        is_marked_ = !report.is_reset;
+        return CardEvent::none;
     }
     CardEvent contend(const CardReport& report, std::int64_t period_ns) noexcept {
         if (report.is_reset && is_marked_) return lose_power();
         foreign_ns_ = report.has_foreign_writes ? 0 : foreign_ns_ + period_ns;
         if (foreign_ns_ >= quiet_ns) {
-            configure();
+            begin();
         }
         return CardEvent::none;
     }
     /// The settings are in the card when the writes before the newest request have arrived, and the
     /// card shows neither an old bite nor the registers of a start.
     CardEvent confirm(const CardReport& report) noexcept {
-        if (report.is_reset && is_marked_) return lose_power();
-        is_marked_ = !report.is_reset;
+        if (watch_power(report) == CardEvent::was_reset) return CardEvent::was_reset;
         const bool is_confirmed =
             has_written_ && report.writes_arrived && !report.is_reset && !report.has_bitten;
         if (is_confirmed) {
@@ -141,6 +151,7 @@ private:
         if (report.is_reset) return lose_power();
         if (report.has_bitten) {
             was_off_ = true;
+            awaits_acknowledgment_ = true;
             state_ = CardState::bitten;
             return CardEvent::bitten;
         }
@@ -153,6 +164,7 @@ private:
     bool has_written_ = false;  // in this configuration
     bool is_marked_ = false;  // the card has shown that it is not in the state of a start
     bool was_off_ = false;
+    bool awaits_acknowledgment_ = false;
 };
 
 }  // namespace hal::mesa

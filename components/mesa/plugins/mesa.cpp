@@ -44,8 +44,10 @@ first, other functions behind it, then `read`.
 
 A lost datagram costs the data of one cycle and is counted in `lost-requests`; step generators go on at their last rates. After more than `hold-cycles` cycles
 without an answer the card is lost: `online` is FALSE, a fault is recorded, and the card switches its outputs off by its own watchdog, within
-`watchdog.timeout_ns`. Until then motors may run: `velocity-fb` is the last velocity, and `position-valid` FALSE. A card that answers again is configured and runs within a few cycles. Where the motor may not have followed, `stepgen.NN.position-valid` is FALSE, and the step generator stands until its
-`enable` was FALSE. When the watchdog bites although the card is there, because a thread was too late, outputs stay off until `watchdog.has_bit` is set to FALSE.
+`watchdog.timeout_ns`. Until then motors may run: `velocity-fb` is the last velocity, and `position-valid` FALSE. A card that answers again is configured and runs
+within a few cycles. Where the motor may not have followed, `stepgen.NN.position-valid` is FALSE, and the step generator stands until its `enable` was FALSE. When
+the watchdog bites although the card is there, because a thread was too late, outputs stay off until `watchdog.has_bit` is set to FALSE; a loss or a reset of the
+card, `stop` and `reload` do not end that.
 
 `clock=card` lets all threads follow the DPLL of the card. Not supported are SSI, BiSS, Fanuc and resolver inputs, UARTs, RC PWM and table-driven steps; a firmware with such
 modules is accepted, and they are named when it is loaded.

@@ -132,7 +132,8 @@ struct MesaComponent : LoadedCard, hal::bus::BusComponent {
         }
         tell_waiting();
         follow_remotes();
-        acknowledge();
+        follow_bite();
+        tell_release();
         show(is_fresh);
         if (leads_ && is_fresh) {
             // a reading that is late in the period of the card has to be earlier
@@ -299,10 +300,10 @@ private:
         const Reply reply = link_->reply();
         report.writes_arrived =
             link_->writes_arrived() && reply.at(watchdog_timeout_) == sent_timeout_;
-        report.has_foreign_writes = link_->has_foreign_writes();
         report.is_reset =
             (reply.at(watchdog_timeout_) & watchdog::off) != 0 || link_->has_forgotten_count();
         report.has_bitten = shows_bite();
+        report.has_foreign_writes = link_->has_foreign_writes();
         return report;
     }
     /// Pins become outputs only behind an answer that is younger than the timeout of the watchdog
@@ -336,6 +337,7 @@ private:
         case CardEvent::none: break;
         case CardEvent::online:
             tell({Event::online});
+            end(bite_fault_);
             has_bit_ = false;
             break;
         case CardEvent::lost:
@@ -347,16 +349,22 @@ private:
             note_stop();
             lose_sight();
             break;
-        case CardEvent::returned: come_back({Event::returned}, monitor_.was_off(), false); break;
+        case CardEvent::returned:
+            come_back({monitor_.awaits_acknowledgment() ? Event::returned_bitten : Event::returned},
+                      monitor_.was_off(), false);
+            break;
         case CardEvent::was_reset:
             resets_ = resets_ + 1;
             if (!was_lost_) {
                 hold_positions();
             }
-            come_back({Event::was_reset}, true, true);
+            come_back(
+                {monitor_.awaits_acknowledgment() ? Event::was_reset_bitten : Event::was_reset},
+                true, true);
             break;
         case CardEvent::bitten:
             tell({Event::bitten});
+            has_told_bite_ = true;
             has_bit_ = true;
             lose_positions();
             break;
@@ -444,11 +452,18 @@ private:
             tell({Event::setting_waits, static_cast<std::uint32_t>(unit)});
         });
     }
-    void acknowledge() noexcept {
-        if (monitor_.state() == CardState::bitten && !has_bit_) {
+    /// Outputs stay off after a bite, also while the card is lost, until has_bit is FALSE.
+    void follow_bite() noexcept {
+        if (!monitor_.awaits_acknowledgment()) return;
+        if (!std::exchange(has_told_bite_, true)) {
+            tell({Event::still_bitten});  // a reload
+            has_bit_ = true;
+        } else if (!has_bit_) {
             monitor_.acknowledge();
             rewrites_ = true;
         }
+    }
+    void tell_release() noexcept {
         if (stepgens_ != nullptr && position_fault_.lasts() && stepgens_->are_released()) {
             tell({Event::positions_valid});
         }
@@ -498,7 +513,8 @@ private:
             packet_error_total_ = packet_error_total_ + 1;
         }
         online_ = monitor_.state() == CardState::online;
-        fault_ = link_fault_.lasts() || position_fault_.lasts() || has_remote_fault();
+        fault_ = link_fault_.lasts() || bite_fault_.lasts() || position_fault_.lasts() ||
+                 has_remote_fault();
         requests_ = counts.requests;
         lost_requests_ = counts.lost;
         lost_writes_ = counts.lost_writes;
@@ -575,6 +591,8 @@ private:
         case Event::positions_valid: return position_fault_;
         case Event::remote_lost:
         case Event::remote_online: return remote_faults_[record.unit];
+        case Event::bitten:
+        case Event::still_bitten: return bite_fault_;
         default: return link_fault_;
         }
     }
@@ -667,7 +685,7 @@ private:
     std::unique_ptr<EventTexts> texts_;
     std::size_t unused_modules_ = 0;
     std::unique_ptr<hal::Reporter<EventRecord>> reporter_;
-    hal::LastingFault link_fault_, position_fault_;
+    hal::LastingFault link_fault_, bite_fault_, position_fault_;
     std::vector<hal::LastingFault> remote_faults_;
     unsigned missing_cycles_ = 0;  // before the next answer
     std::int64_t last_read_ns_ = 0;
@@ -679,6 +697,7 @@ private:
     bool hides_reset_ = false;  // the newest datagram has the timeout that shows a reset
     bool may_have_reset_ = false;  // such a datagram had no answer
     bool was_lost_ = false;
+    bool has_told_bite_ = false;  // that awaits its acknowledgment
     bool holds_too_long_ = false;
     bool runs_on_too_long_ = false;
     unsigned unwritten_cycles_ = 0;  // of read without write
