@@ -111,6 +111,17 @@ struct Attached {
 /// has a server, is a problem. The server outlives the attachment. [setup]
 Attached attach(std::string_view address, Server& server);
 
+/// The right to command a device; it ends with the last copy of `claim`.
+struct Claimed {
+    std::shared_ptr<const std::string> claim;  ///< nullptr: `holder` has it
+    std::string holder{};
+    explicit operator bool() const noexcept { return claim != nullptr; }
+};
+
+/// Makes `user` the only one of this process that commands the device of an address. The same user
+/// gets a copy of its claim, as its next version in a reload. [setup]
+Claimed claim(std::string_view address, const std::string& user);
+
 #pragma GCC visibility pop
 
 }  // namespace hal::datagram

@@ -128,6 +128,21 @@ TEST(DatagramPort, Attach_rejects_a_name_that_has_a_card) {
               "'eth:127.0.0.1' is not the address of a card in memory; write sim:NAME");
 }
 
+TEST(DatagramPort, Claim_gives_a_device_to_one_user_at_a_time) {
+    datagram::Claimed first = datagram::claim("sim:claimed", "one");
+    EXPECT_TRUE(first);
+    datagram::Claimed reloaded = datagram::claim("sim:claimed", "one");
+    EXPECT_TRUE(reloaded);
+    first.claim.reset();
+    const datagram::Claimed second = datagram::claim("sim:claimed", "two");
+    EXPECT_FALSE(second);
+    EXPECT_EQ(second.holder, "one");
+    EXPECT_TRUE(datagram::claim("eth:127.0.0.1", "two"));
+    EXPECT_TRUE(datagram::claim("sim:other", "two"));
+    reloaded.claim.reset();
+    EXPECT_TRUE(datagram::claim("sim:claimed", "two"));
+}
+
 TEST(DatagramPort, Open_names_what_is_wrong_in_an_address) {
     EXPECT_EQ(datagram::open("10.10.10.10").problem,
               "'10.10.10.10' is not the address of a card; write eth:10.10.10.10 for a card on the "

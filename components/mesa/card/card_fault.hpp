@@ -23,16 +23,18 @@ enum class CardFaultKind : std::uint8_t {
     bite,           ///< the watchdog bites, once
     reset,          ///< the card loses its power and gets it back, once
     quadrature_error,  ///< encoders see A and B change at the same time, once
+    other_master,  ///< another master makes all pins inputs, once
 };
 inline constexpr const char* card_fault_names[] = {
-    "drop-request", "drop-reply",    "delay",       "duplicate", "swap",  "wrong-length",
-    "wrong-cookie", "stuck-counter", "remote-lost", "bite",      "reset", "quadrature-error"};
+    "drop-request", "drop-reply",       "delay",         "duplicate",   "swap",
+    "wrong-length", "wrong-cookie",     "stuck-counter", "remote-lost", "bite",
+    "reset",        "quadrature-error", "other-master"};
 inline constexpr std::size_t card_fault_kinds = std::size(card_fault_names);
 
 /// Whether a fault is an event, in place of something that lasts. [any]
 constexpr bool happens_once(CardFaultKind kind) noexcept {
     return kind == CardFaultKind::bite || kind == CardFaultKind::reset ||
-           kind == CardFaultKind::quadrature_error;
+           kind == CardFaultKind::quadrature_error || kind == CardFaultKind::other_master;
 }
 
 struct CardFault {

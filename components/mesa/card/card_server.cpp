@@ -74,6 +74,7 @@ void CardServer::strike(CardFaultKind kind) noexcept {
         held_size_ = 0;
         break;
     case CardFaultKind::quadrature_error: card_.fail_encoders(); break;
+    case CardFaultKind::other_master: card_.make_inputs(); break;
     default: break;
     }
 }

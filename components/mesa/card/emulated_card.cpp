@@ -423,6 +423,9 @@ void EmulatedCard::fail_encoders() noexcept {
 void EmulatedCard::bite() noexcept {
     watchdog_.bite();
     ++bites_;
+    make_inputs();
+}
+void EmulatedCard::make_inputs() noexcept {
     for (Port& port : ports_) {
         port.direction = 0;
         port.open_drain = 0;

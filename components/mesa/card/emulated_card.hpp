@@ -43,6 +43,8 @@ public:
     void bite() noexcept;
     /// All encoders see A and B change at the same time.
     void fail_encoders() noexcept;
+    /// All pins become inputs.
+    void make_inputs() noexcept;
     /// The card loses its power and gets it back: all registers are reset, the machine stays.
     void reset() noexcept;
     void set_remotes_lost(bool lost) noexcept { serial_.set_lost(lost); }

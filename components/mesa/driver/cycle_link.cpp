@@ -33,11 +33,13 @@ CycleLink::CycleLink(datagram::Port& port, ReadLayout layout, std::uint16_t sess
     reply_size_ = reads_.reply_size();
     read_count_offset_ = *count;
     counts_offset_ = *counts;
+    packets_offset_ = *packets;
 }
 
 void CycleLink::request(std::int64_t now_ns) noexcept {
     if (is_requested_) return;
     note_request(now_ns, false);
+    ++sent_;
     port_.send(reads_.bytes(), now_ns);
 }
 
@@ -47,6 +49,7 @@ void CycleLink::note_request(std::int64_t now_ns, bool is_joined) noexcept {
     is_requested_ = true;
     is_joined_ = is_joined;
     requested_ns_ = now_ns;
+    sent_with_request_ = static_cast<std::uint16_t>(sent_ + 1);
     expected_write_count_ = write_count_;
     ++counts_.requests;
 }
@@ -65,6 +68,7 @@ Answer CycleLink::receive(std::int64_t now_ns, std::int64_t limit_ns) noexcept {
         if (!port_.wait(wait_ns)) break;
     }
     if (drain(now_ns)) return Answer::fresh;
+    has_packets_ = false;
     ++counts_.lost;
     return Answer::missing;
 }
@@ -85,6 +89,7 @@ bool CycleLink::accept(std::size_t size) noexcept {
     if (load<std::uint32_t>(bytes + counts_offset_) != number(read_count_)) return false;
     newest_ = 1 - newest_;
     note_counts();
+    note_packets();
     return true;
 }
 
@@ -103,6 +108,16 @@ void CycleLink::note_counts() noexcept {
     card_write_count_ = count;
 }
 
+/// Behind an answer that is missing, lost requests would hide those of others.
+void CycleLink::note_packets() noexcept {
+    const auto packets = load<std::uint16_t>(buffers_[newest_].data() + packets_offset_);
+    const auto surplus = static_cast<std::uint16_t>(packets - sent_with_request_);
+    const auto change = static_cast<std::int16_t>(surplus - surplus_);
+    has_other_requests_ = has_packets_ && change > 0;
+    surplus_ = surplus;
+    has_packets_ = true;
+}
+
 /// Returns whether the reads are in the datagram of the writes.
 bool CycleLink::begin_send(std::int64_t now_ns, bool requests, std::size_t late_size) noexcept {
     const std::size_t size = writes_.size() + reads_.size() + late_size + count_size;
@@ -116,6 +131,7 @@ void CycleLink::end_send(std::int64_t now_ns, bool requests) noexcept {
     if (!keeps_count_) {
         put_count(writes_, timers::write_count, number(++write_count_));
     }
+    ++sent_;
     port_.send(writes_.bytes(), now_ns);
     if (requests) {
         request(now_ns);

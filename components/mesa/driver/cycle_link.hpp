@@ -42,7 +42,10 @@ public:
     CycleLink(datagram::Port& port, ReadLayout layout, std::uint16_t session);
 
     /// Forgets requests and counts of the card, as after a pause. [setup] or [realtime]
-    void restart() noexcept { is_requested_ = false; }
+    void restart() noexcept {
+        is_requested_ = false;
+        has_packets_ = false;
+    }
 
     /// Sends the reads of this cycle, unless they are under way.
     void request(std::int64_t now_ns) noexcept;
@@ -79,6 +82,9 @@ public:
     /// Returns whether the newest answer has another write count of another master than the one
     /// before.
     bool has_foreign_writes() const noexcept { return has_foreign_writes_; }
+    /// Returns whether the card has received more requests since the answer before than were sent:
+    /// settings may have been changed.
+    bool has_other_requests() const noexcept { return has_other_requests_; }
     /// Returns whether the newest answer shows that the card has forgotten a count that was kept: it
     /// was reset.
     bool has_forgotten_count() const noexcept { return has_forgotten_count_; }
@@ -100,6 +106,7 @@ private:
     bool drain(std::int64_t now_ns) noexcept;
     bool accept(std::size_t size) noexcept;
     void note_counts() noexcept;
+    void note_packets() noexcept;
     std::uint32_t number(std::uint16_t count) const noexcept {
         return std::uint32_t{session_} << 16 | count;
     }
@@ -112,6 +119,12 @@ private:
     std::size_t read_count_offset_ = 0;  ///< of the number in the reads
     std::size_t reply_size_ = 0;
     std::size_t counts_offset_ = 0;
+    std::size_t packets_offset_ = 0;
+    std::uint16_t sent_ = 0;  ///< datagrams, as the card counts them
+    std::uint16_t sent_with_request_ = 0;
+    std::uint16_t surplus_ = 0;  ///< of the packets of the card over those
+    bool has_packets_ = false;  ///< `surplus_` is that of the answer of the cycle before
+    bool has_other_requests_ = false;
     std::uint16_t read_count_ = 0;
     std::uint16_t write_count_ = 0;
     std::uint16_t expected_write_count_ = 0;  ///< before the newest request

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 #include "mesa/lbp16/packet.hpp"
 
@@ -32,6 +33,11 @@ public:
     std::uint16_t address() const noexcept { return address_; }
     /// Returns the bits that the card has, as an answer has shown.
     std::uint32_t confirmed() const noexcept { return is_confirmed_ ? sent_ : 0; }
+    /// Returns what an answer shows if nobody else has written to the card; nothing: unknown.
+    std::optional<std::uint32_t> expected(bool writes_arrived) const noexcept {
+        const bool has_it = is_confirmed_ || (is_in_flight_ && writes_arrived);
+        return has_it ? std::optional(sent_) : std::nullopt;
+    }
 
     /// Writes the register unless the card has the value. `may_set`: bits may be set now.
     void transmit(Outgoing& out, std::uint32_t value, bool may_set) noexcept;

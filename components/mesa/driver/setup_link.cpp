@@ -13,19 +13,24 @@ std::span<const std::uint8_t> SetupLink::exchange(Request request) {
     if (!request.read(Space::card, card::name, Unit::u16, sequence_)) {
         throw CardError(address() + ": a request of the driver is too long");
     }
+    bool is_sent = false;
     for (int n = 0; n < tries; ++n) {
         while (port_.receive(buffer_, datagram::unclocked) != 0) {
             // left over from a request before
         }
         ++sent_;
-        if (port_.send(request.bytes(), datagram::unclocked) && receive(request.reply_size())) {
-            return std::span(buffer_).first(size);
-        }
+        if (!port_.send(request.bytes(), datagram::unclocked)) continue;
+        if (receive(request.reply_size())) return std::span(buffer_).first(size);
+        is_sent = true;
     }
     std::string text =
         address() + ": no answer from a card (" + std::to_string(tries) + " requests, 20 ms each)";
     const std::string& remark = port_.description().remark;
-    if (in_memory()) {
+    if (in_memory() && is_sent) {
+        text +=
+            "; the emulated card is loaded: set its faults to FALSE, drop-request, drop-reply and "
+            "their like, and its loss and delay to 0";
+    } else if (in_memory()) {
         text += "; load the emulated card first: loadrt mesa_card link=" + address();
     } else if (!remark.empty()) {
         text += "; " + remark;

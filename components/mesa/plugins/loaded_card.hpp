@@ -54,11 +54,12 @@ protected:
         } else {
             image_ = example_card();
         }
+        const hal::InstanceName instance(c, ("hm2_" + image_.name).c_str());
+        claim(names);
         if (const std::string problem = apply(config_, image_); !problem.empty()) {
             throw hal::ArgumentError("config", problem);
         }
         discover(names);
-        const hal::InstanceName instance(c, ("hm2_" + image_.name).c_str());
     }
 
     /// Throws when another program sends requests to the card. [setup]
@@ -81,6 +82,7 @@ protected:
     ConfigString config_;
     CardImage image_;
     std::unique_ptr<datagram::Port> port_;  ///< nullptr: an example
+    std::shared_ptr<const std::string> claim_;
     std::vector<RemotePort> remote_ports_;
     std::vector<unsigned> inm_widths_, inmux_widths_;
     bool leads_ = false;  ///< the DPLL of the card leads the threads
@@ -110,6 +112,20 @@ private:
         } catch (const CardError& e) {
             throw hal::ArgumentError(names.board, e.what());
         }
+    }
+    /// Before the first request that writes.
+    void claim(const MesaNames& names) {
+        if (port_ == nullptr) return;
+        const std::string& address = port_->description().address;
+        const std::string component = names.is_linuxcncs ? "hm2_eth" : "mesa";
+        datagram::Claimed claimed =
+            datagram::claim(address, hal::own_name("hm2_card.0") + " (" + component + ")");
+        if (!claimed) {
+            throw hal::ArgumentError(
+                names.board, address + " (" + image_.card + "): " + claimed.holder +
+                                 " uses this card; unload that first: a card has one master");
+        }
+        claim_ = std::move(claimed.claim);
     }
     void discover(const MesaNames& names) {
         if (port_ == nullptr) return;

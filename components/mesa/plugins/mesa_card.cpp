@@ -107,6 +107,8 @@ struct MesaCard : hal::Component {
     hal::In<bool> reset_{*this, "reset", "rising edge: the card loses its power and gets it back"};
     hal::In<bool> quadrature_error_{*this, "quadrature-error",
                                     "rising edge: encoders see A and B change at the same time"};
+    hal::In<bool> other_master_{*this, "other-master",
+                                "rising edge: another master makes all pins inputs"};
     hal::In<double> loss_{*this, "loss", "share of the datagrams that are lost at random, 0..1"};
     hal::Out<std::uint64_t> requests_{*this, "requests", "requests that the card has executed"};
     hal::Out<std::uint64_t> lost_{*this, "lost", "requests and replies that were lost"};
@@ -130,6 +132,7 @@ struct MesaCard : hal::Component {
         must_bite_ = must_bite_ || bites;
         must_reset_ = must_reset_ || resets;
         must_fail_ = must_fail_ || fails;
+        must_make_inputs_ = other_master_edge_.rises(other_master_) || must_make_inputs_;
         attachment_->exclusively([](void* self) { static_cast<MesaCard*>(self)->work(); }, this);
     }
 
@@ -204,6 +207,9 @@ private:
         if (std::exchange(must_fail_, false)) {
             server_->strike(CardFaultKind::quadrature_error);
         }
+        if (std::exchange(must_make_inputs_, false)) {
+            server_->strike(CardFaultKind::other_master);
+        }
         machine_->show(*card_);
         requests_ = card_->requests();
         lost_ = server_->lost();
@@ -217,8 +223,8 @@ private:
     std::unique_ptr<EmulatedCard> card_;
     std::unique_ptr<CardServer> server_;
     std::unique_ptr<hal::datagram::Attachment> attachment_;
-    hal::RisingEdge bite_edge_, reset_edge_, quadrature_edge_;
-    bool must_bite_ = false, must_reset_ = false, must_fail_ = false;
+    hal::RisingEdge bite_edge_, reset_edge_, quadrature_edge_, other_master_edge_;
+    bool must_bite_ = false, must_reset_ = false, must_fail_ = false, must_make_inputs_ = false;
     std::int64_t now_ns_ = 0;
 };
 
@@ -265,7 +271,7 @@ Pins of the machine have the names of its parts: `x.position`, `x-home`, `spindl
 are outputs of the module, so that a bite of the watchdog stops it, as a real one.
 
 The faults of a card and of the network are pins: `loss`, `drop-request`, `drop-reply`, `delay`, `duplicate`, `swap`, `wrong-length`, `wrong-cookie`,
-`stuck-counter`, `remote-lost`, `bite`, `reset`, `quadrature-error`.
+`stuck-counter`, `remote-lost`, `bite`, `reset`, `quadrature-error`, `other-master`.
 
 As a process with an IP address, it is `hal node mesa FILE`.
 )")

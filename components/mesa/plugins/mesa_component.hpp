@@ -293,7 +293,7 @@ private:
     bool shows_bite() const noexcept {
         return (link_->reply().at(watchdog_status_) & watchdog::has_bitten) != 0;
     }
-    CardReport report(bool is_fresh) const noexcept {
+    CardReport report(bool is_fresh) noexcept {
         CardReport report;
         report.is_fresh = is_fresh;
         if (!is_fresh) return report;
@@ -303,7 +303,10 @@ private:
         report.is_reset =
             (reply.at(watchdog_timeout_) & watchdog::off) != 0 || link_->has_forgotten_count();
         report.has_bitten = shows_bite();
-        report.has_foreign_writes = link_->has_foreign_writes();
+        const bool is_untouched = !report.is_reset && !report.has_bitten;
+        report.has_foreign_writes =
+            link_->has_foreign_writes() ||
+            (is_untouched && ports_->were_changed(reply, link_->writes_arrived()));
         return report;
     }
     /// Pins become outputs only behind an answer that is younger than the timeout of the watchdog
@@ -371,6 +374,7 @@ private:
         case CardEvent::contended:
             tell({Event::contended});
             give_up_positions();
+            ports_->has_stopped();
             break;
         }
     }
@@ -430,7 +434,7 @@ private:
             module->receive(reply, reading);
         }
         tell_losses();
-        if (link_->counts().lost_writes != lost_writes_.get()) {
+        if (link_->counts().lost_writes != lost_writes_.get() || link_->has_other_requests()) {
             rewrites_ = true;
         }
     }

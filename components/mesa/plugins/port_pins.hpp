@@ -83,6 +83,7 @@ public:
 
     void plan(ReadLayout& layout) override {
         levels_ = layout.add_instances(addresses_, ioport::data, ports_);
+        directions_ = layout.add_instances(addresses_, ioport::direction, ports_);
     }
     void receive(const Reply& reply, const Reading& reading) noexcept override {
         for (Registers& r : registers_) {
@@ -98,6 +99,22 @@ public:
             r.open_drain.miss();
             r.direction.miss();
         }
+    }
+    /// Returns whether an answer without a bite or a reset shows other directions than those that
+    /// were written. A card counts as one that shows them when it has done so. [realtime] read
+    bool were_changed(const Reply& reply, bool writes_arrived) noexcept {
+        bool differs = false;
+        bool agrees = false;
+        for (unsigned port = 0; port < ports_; ++port) {
+            const auto expected = registers_[port].direction.expected(writes_arrived);
+            if (!expected) continue;
+            const bool is_same = reply.word(directions_, port) == *expected;
+            differs = differs || !is_same;
+            agrees = agrees || (is_same && *expected != 0);
+        }
+        const bool shows_directions = shows_directions_;
+        shows_directions_ = shows_directions_ || agrees;
+        return differs && shows_directions;
     }
     /// Returns whether the card has the pins of modules as outputs, as an answer has shown.
     /// [realtime]
@@ -187,6 +204,8 @@ private:
     std::vector<Placed<PortPin>> pins_;
     std::vector<Registers> registers_;
     std::size_t levels_ = 0;
+    std::size_t directions_ = 0;
+    bool shows_directions_ = false;  ///< its registers can be read
 };
 
 }  // namespace hal::mesa

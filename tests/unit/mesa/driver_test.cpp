@@ -108,10 +108,18 @@ TEST_F(ProbeTest, Tries_three_times) {
     EXPECT_EQ(probe_problem(), "");
     card.drops_requests = 3;
     EXPECT_EQ(probe_problem(),
-              "sim:card: no answer from a card (3 requests, 20 ms each); load the emulated card "
-              "first: loadrt mesa_card link=sim:card");
+              "sim:card: no answer from a card (3 requests, 20 ms each); the emulated card is "
+              "loaded: set its faults to FALSE, drop-request, drop-reply and their like, and its "
+              "loss and delay to 0");
     card.drops_replies = 2;
     EXPECT_EQ(probe_problem(), "");
+}
+
+TEST_F(ProbeTest, Names_the_component_of_a_card_that_is_not_loaded) {
+    attached.attachment.reset();
+    EXPECT_EQ(probe_problem(),
+              "sim:card: no answer from a card (3 requests, 20 ms each); load the emulated card "
+              "first: loadrt mesa_card link=sim:card");
 }
 
 TEST_F(ProbeTest, Is_not_misled_by_duplicate_answers) {
@@ -381,6 +389,33 @@ TEST_F(CycleTest, Shows_the_writes_of_another_master) {
     EXPECT_TRUE(link->has_foreign_writes());
 }
 
+TEST_F(CycleTest, Shows_that_another_program_has_sent_requests) {
+    for (int n = 0; n < 3; ++n) {
+        write(1);
+        EXPECT_EQ(next(), Answer::fresh);
+        EXPECT_FALSE(link->has_other_requests());
+        write(1, false);  // a cycle of two datagrams
+        link->request(now);
+        EXPECT_EQ(next(), Answer::fresh);
+        EXPECT_FALSE(link->has_other_requests());
+    }
+    Request other;
+    other.write32(0x3000, 5);
+    opened.port->send(other.bytes(), now);
+    write(1);
+    EXPECT_EQ(next(), Answer::fresh);
+    EXPECT_TRUE(link->has_other_requests());
+    write(1);
+    EXPECT_EQ(next(), Answer::fresh);
+    EXPECT_FALSE(link->has_other_requests());
+    card.drops_requests = 1;
+    write(1);
+    EXPECT_EQ(next(), Answer::missing);
+    write(1);
+    EXPECT_EQ(next(), Answer::fresh);
+    EXPECT_FALSE(link->has_other_requests());
+}
+
 TEST_F(CycleTest, Settings_are_written_when_they_change) {
     Setting setting(0x3000);
     Request request;
@@ -642,6 +677,36 @@ TEST_F(MonitorTest, Keeps_outputs_off_after_a_bite_until_it_is_acknowledged) {
     }
     monitor.acknowledge();
     EXPECT_EQ(with(false, true), CardEvent::none);
+    EXPECT_EQ(good(), CardEvent::online);
+}
+
+TEST_F(MonitorTest, A_bite_outlasts_losses_resets_and_restarts) {
+    go_online();
+    EXPECT_EQ(with(false, true), CardEvent::bitten);
+    for (int n = 0; n < 5; ++n) {
+        missing();
+    }
+    EXPECT_EQ(monitor.state(), CardState::lost);
+    EXPECT_EQ(with(false, true), CardEvent::returned);
+    EXPECT_EQ(monitor.state(), CardState::bitten);
+    EXPECT_EQ(with(true, false), CardEvent::was_reset);
+    EXPECT_EQ(with(true, false), CardEvent::none);
+    EXPECT_EQ(monitor.state(), CardState::bitten);
+    for (int n = 0; n < 5; ++n) {
+        missing();
+    }
+    EXPECT_EQ(with(true, false), CardEvent::was_reset);
+    EXPECT_EQ(monitor.state(), CardState::bitten);
+    monitor.restart();
+    EXPECT_EQ(good(), CardEvent::none);
+    EXPECT_EQ(monitor.state(), CardState::bitten);
+    for (int n = 0; n < 5; ++n) {
+        missing();
+    }
+    monitor.acknowledge();
+    EXPECT_EQ(monitor.state(), CardState::lost);
+    EXPECT_EQ(good(), CardEvent::returned);
+    EXPECT_EQ(good(), CardEvent::none);
     EXPECT_EQ(good(), CardEvent::online);
 }
 

@@ -82,10 +82,12 @@ struct MesaNodeOptions : Options {
         set.value("--address", address, "HOST[:PORT]",
                   "IP address of this computer on which the card answers; default: that of the "
                   "file, or 127.0.0.1");
-        set.values("--fault", faults, "FAULT",
-                   "drop-request, drop-reply, delay, duplicate, swap, wrong-length, wrong-cookie, "
-                   "stuck-counter, remote-lost, bite or reset, with options: "
-                   "delay:every=50:delay=2ms:from=1s:for=2s; may be repeated");
+        set.values(
+            "--fault", faults, "FAULT",
+            "drop-request, drop-reply, delay, duplicate, swap, wrong-length, wrong-cookie, "
+            "stuck-counter, remote-lost, bite, reset, quadrature-error or other-master, with "
+            "options: "
+            "delay:every=50:delay=2ms:from=1s:for=2s; may be repeated");
         set.value("--loss", loss, "SHARE", "datagrams lost at random in each direction: 0.01, 1%");
         set.values("--set", settings, "INPUT=yes|no", "set an input of the file; may be repeated");
         set.flag("--verbose", verbose, "print the machine and the watchdog as they change");
