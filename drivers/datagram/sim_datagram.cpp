@@ -15,6 +15,7 @@
 
 #include "link/bus_key.hpp"
 #include "link/call_order.hpp"
+#include "link/system.hpp"
 
 namespace hal::datagram::sim {
 
@@ -118,23 +119,9 @@ public:
     SimPort(std::shared_ptr<Place> place, Description description)
         : place_(std::move(place)), description_(std::move(description)) {}
 
-    /// Outside of a cycle it tries longer, but not for ever: that may be in a crash handler, in the
-    /// thread that has the server.
     bool send(std::span<const std::uint8_t> bytes, std::int64_t now_ns) noexcept override {
         if (bytes.empty() || bytes.size() > max_size) return false;
-        const int tries = now_ns == unclocked ? 1000 : 1;
-        for (int n = 0; n < tries; ++n) {
-            const Hold hold(*place_, false);
-            if (hold.is_held()) {
-                if (place_->server == nullptr) return false;
-                place_->server->serve(bytes, now_ns, replies_);
-                return true;
-            }
-            if (tries > 1) {
-                sched_yield();
-            }
-        }
-        return false;
+        return now_ns == unclocked ? send_patiently(bytes) : try_send(bytes, now_ns) == Sent::yes;
     }
     std::size_t receive(std::span<std::uint8_t> to, std::int64_t now_ns) noexcept override {
         return replies_.pop(to, now_ns);
@@ -143,6 +130,35 @@ public:
     const Description& description() const noexcept override { return description_; }
 
 private:
+    enum class Sent : std::uint8_t { no, yes, busy };
+
+    Sent try_send(std::span<const std::uint8_t> bytes, std::int64_t now_ns) noexcept {
+        const Hold hold(*place_, false);
+        if (!hold.is_held()) return Sent::busy;
+        if (place_->server == nullptr) return Sent::no;
+        place_->server->serve(bytes, now_ns, replies_);
+        return Sent::yes;
+    }
+    /// Outside of a cycle it tries longer, but not for ever: that may be in a crash handler, in the
+    /// thread that has the server. In a re-execution it gets the outcome of each try, and nobody
+    /// gives the server back by its waiting.
+    bool send_patiently(std::span<const std::uint8_t> bytes) noexcept {
+        constexpr int max_tries = 1000;
+        constexpr std::int64_t max_wait_ns = 50'000'000;
+        const bool may_wait = link::journal_mode() != link::JournalMode::executes_again;
+        const link::HiddenReadings hidden;
+        const std::int64_t limit_ns = link::monotonic_ns() + max_wait_ns;
+        Sent sent = try_send(bytes, unclocked);
+        for (int n = 1; n < max_tries && sent == Sent::busy; ++n) {
+            if (may_wait && link::monotonic_ns() > limit_ns) break;
+            if (may_wait) {
+                sched_yield();
+            }
+            sent = try_send(bytes, unclocked);
+        }
+        return sent == Sent::yes;
+    }
+
     const std::shared_ptr<Place> place_;
     const Description description_;
     ReplyQueue replies_;

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: MIT
 // Journaled links give their user the same results again, and open nothing.
+#include <sys/syscall.h>
+#include <unistd.h>
+
 #include <array>
+#include <atomic>
 #include <cstring>
 #include <optional>
 #include <semaphore>
@@ -18,6 +22,7 @@
 #include "ethernet/journal/ordered_port.hpp"
 #include "link/call_journal.hpp"
 #include "link/call_order.hpp"
+#include "link/datagram.hpp"
 #include "link/ordered_hold.hpp"
 #include "link/segment.hpp"
 
@@ -35,11 +40,13 @@ struct FakeJournal {
     std::vector<std::uint64_t> waited;
 };
 FakeJournal journal;
+std::atomic<unsigned> yields{0};
 
 }  // namespace
 }  // namespace hal::test
 
 using hal::test::journal;
+using hal::test::yields;
 
 extern "C" {
 int hal_journal_mode() noexcept { return journal.mode; }
@@ -66,6 +73,12 @@ void hal_journal_order() noexcept {
     journal.waited.push_back(ticket);
 }
 void hal_journal_link(int) noexcept {}
+
+/// In the place of that of the system.
+int sched_yield() noexcept {
+    ++yields;
+    return static_cast<int>(syscall(SYS_sched_yield));
+}
 }
 
 namespace hal::test {
@@ -405,6 +418,49 @@ TEST(OrderedHold, Gives_the_outcome_of_each_try_back_and_orders_the_calls_within
     EXPECT_EQ(texts[1], texts[0]);
     // the two that were held, each with a call, and the one in setup
     EXPECT_EQ(waited, (std::vector<std::uint64_t>{0, 1, 2, 3, 4}));
+}
+
+/// A card that has nothing to say.
+struct SilentCard final : datagram::Server {
+    int requests = 0;
+    void serve(std::span<const std::uint8_t>, std::int64_t, datagram::Replies&) noexcept override {
+        ++requests;
+    }
+};
+
+TEST(JournaledDatagram, A_stop_that_the_journal_does_not_have_does_not_wait) {
+    SilentCard card;
+    const auto attached = datagram::attach("sim:stopped", card);
+    const auto opened = datagram::open("sim:stopped");
+    ASSERT_TRUE(opened) << opened.problem;
+    const std::array<std::uint8_t, 4> request{};
+    yields = 0;
+    journal = {};
+    journal.mode = 2;
+    EXPECT_FALSE(opened.port->send(request, datagram::unclocked));
+    EXPECT_EQ(0U, yields);
+    EXPECT_FALSE(journal.hidden);
+    journal = {};
+    EXPECT_TRUE(opened.port->send(request, datagram::unclocked));
+    EXPECT_EQ(1, card.requests);
+}
+
+TEST(JournaledDatagram, A_stop_while_the_card_was_busy_is_executed_with_the_same_tries) {
+    SilentCard card;
+    const auto attached = datagram::attach("sim:stopped", card);
+    const auto opened = datagram::open("sim:stopped");
+    ASSERT_TRUE(opened) << opened.problem;
+    const std::array<std::uint8_t, 4> request{};
+    yields = 0;
+    journal = {};
+    journal.mode = 2;
+    journal.data = std::string("\0\0\1", 3) + std::string(sizeof(std::uint64_t), '\7');
+    EXPECT_TRUE(opened.port->send(request, datagram::unclocked));
+    EXPECT_EQ(journal.data.size(), journal.at);
+    EXPECT_EQ(1U, journal.waited.size());
+    EXPECT_EQ(0U, yields);
+    EXPECT_EQ(1, card.requests);
+    journal = {};
 }
 
 }  // namespace
