@@ -148,6 +148,29 @@ class Mesa(Case):
         )
         self.assertEqual((9, 0), (found["lost_requests"], found["lost_replies"]))
 
+    def test_late_replies_are_not_those_of_later_requests(self):
+        self.node("--fault", "delay:delay=60ms")
+        found = json.loads(
+            self.mesa("doctor", "--json", "--count", "20", "--timeout", "20ms", "--every", "1ms")
+        )
+        lost = [found[name] for name in ("lost_requests", "lost_replies", "lost")]
+        self.assertEqual([0, 0, 0], lost)
+        self.assertGreaterEqual(found["p50_ns"], 60_000_000)
+        self.assertEqual((20, 20), (found["answered"], found["late"]))
+        text = self.mesa("doctor", "--count", "4", "--timeout", "20ms")
+        self.assertIn("4 of 4 requests answered, 4 of them later than --timeout; lost: 0 ", text)
+
+    def test_swapped_replies_are_late_and_not_lost(self):
+        self.node("--fault", "swap")
+        found = json.loads(self.mesa("doctor", "--json", "--count", "10", "--timeout", "20ms"))
+        lost = [found[name] for name in ("lost_requests", "lost_replies", "lost")]
+        self.assertEqual([0, 0, 0], lost)
+
+    def test_the_last_reply_is_lost(self):
+        self.node("--fault", "drop-reply:every=2")
+        found = json.loads(self.mesa("doctor", "--json", "--count", "10", "--timeout", "20ms"))
+        self.assertEqual((0, 5, 0), (found["lost_requests"], found["lost_replies"], found["lost"]))
+
     def test_faults_of_the_card(self):
         self.node("--fault", "wrong-cookie")
         self.assertIn("the cookie at 0x0100 is 0xAA553501", self.bad("mesa", "info", self.host))
@@ -186,6 +209,13 @@ class Mesa(Case):
         self.assertIn("VALUE", self.bad("mesa", "write", self.host, "0"))
         self.assertIn("24..32 bits", self.bad("mesa", "scan", "10.0.0.0/8"))
         self.assertIn("invalid --count", self.bad("mesa", "doctor", self.host, "--count", "0"))
+
+    def test_write_beyond_the_end_of_a_space(self):
+        self.assertEqual(
+            "hal mesa write: 2 values from 0xFFFC on go beyond the end of the space, 0xFFFF; write at "
+            "most 1\n",
+            self.bad("mesa", "write", self.host, "0xFFFC", "1", "7"),
+        )
 
     def test_missing_card(self):
         self.assertIn(

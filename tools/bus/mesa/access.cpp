@@ -75,6 +75,13 @@ int run_mesa_write(const MesaAccessOptions& options) {
         return fail(options, problem);
     }
     const std::size_t width = bytes_of(target.unit);
+    const std::size_t room = (0x10000U - target.address) / width;
+    if (options.words.size() - 2 > room) {
+        return fail(options,
+                    fmt::format("{} values from 0x{:04X} on go beyond the end of the space, "
+                                "0xFFFF; write at most {}",
+                                options.words.size() - 2, target.address, room));
+    }
     std::vector<std::uint8_t> data;
     for (std::size_t n = 2; n < options.words.size(); ++n) {
         const auto value = parse_natural(options.words[n]);

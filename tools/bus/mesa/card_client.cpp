@@ -30,6 +30,19 @@ bool CardClient::send(const Request& request) {
     return port_->send(request.bytes(), datagram::unclocked);
 }
 
+std::optional<std::vector<std::uint8_t>> CardClient::receive(std::int64_t limit_ns) {
+    std::vector<std::uint8_t> reply(datagram::max_size);
+    for (;;) {
+        const std::size_t size = port_->receive(reply, datagram::unclocked);
+        if (size > 0) {
+            reply.resize(size);
+            return reply;
+        }
+        const std::int64_t left_ns = limit_ns - link::monotonic_ns();
+        if (left_ns <= 0 || !port_->wait(left_ns)) return std::nullopt;
+    }
+}
+
 std::optional<std::vector<std::uint8_t>> CardClient::ask(const Request& request, int count) {
     std::vector<std::uint8_t> reply(datagram::max_size);
     for (int n = 0; n < count; ++n) {

@@ -26,6 +26,8 @@ public:
     std::optional<std::vector<std::uint8_t>> read(mesa::Space space, std::uint16_t address,
                                                   mesa::Unit unit, std::size_t count);
     bool send(const mesa::Request& request);
+    /// Returns the next datagram that arrives before a time of the monotonic clock.
+    std::optional<std::vector<std::uint8_t>> receive(std::int64_t limit_ns);
     /// Why a card does not answer, as a sentence.
     std::string silence() const;
     const std::string& host() const { return host_; }

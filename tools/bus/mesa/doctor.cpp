@@ -10,75 +10,17 @@
 #include "bus/json_text.hpp"
 #include "bus/mesa/card_identity.hpp"
 #include "bus/mesa/options.hpp"
+#include "bus/mesa/round_trips.hpp"
 #include "cli/other_program.hpp"
 #include "cli/output.hpp"
-#include "cli/signals.hpp"
 #include "link/system.hpp"
-#include "mesa/lbp16/spaces.hpp"
+#include "mesa/lbp16/packet.hpp"
 
 namespace hal::tools {
 
 using namespace mesa;
 
 namespace {
-
-/// The registers that a cycle reads and the counter of packets, as large as those of a driver.
-Request cycle_request() {
-    Request request;
-    request.read(Space::hostmot2, cookie_address, Unit::u32, 15);
-    request.read(Space::status, status::received_packets, Unit::u16, 1);
-    return request;
-}
-
-struct Trips {
-    std::vector<std::int64_t> ns;  ///< of requests that were answered, sorted
-    int sent = 0;
-    int lost_requests = 0;  ///< the card did not count them
-    int lost_replies = 0;
-
-    std::int64_t at(double share) const {
-        const auto n = static_cast<std::size_t>(share * static_cast<double>(ns.size() - 1) + 0.5);
-        return ns[n];
-    }
-};
-
-/// Sends requests at a steady rate. The card's counter of packets shows in which direction the
-/// missing ones were lost.
-Trips measure(CardClient& card, const MesaDoctorOptions& options) {
-    const Request request = cycle_request();
-    StopRequest stop;
-    Trips trips;
-    int missing = 0;
-    std::uint16_t counter = 0;
-    bool has_counter = false;
-    std::int64_t due_ns = link::monotonic_ns();
-    for (; trips.sent < options.count && !stop.requested(); ++trips.sent) {
-        const std::int64_t begin_ns = link::monotonic_ns();
-        const auto reply = card.ask(request, 1);
-        if (!reply) {
-            ++missing;
-        } else {
-            trips.ns.push_back(link::monotonic_ns() - begin_ns);
-            const auto now = load<std::uint16_t>(reply->data() + reply->size() - 2);
-            const int counted = static_cast<std::uint16_t>(now - counter) - 1;
-            if (has_counter && missing > 0) {
-                trips.lost_replies += std::clamp(counted, 0, missing);
-                trips.lost_requests += missing - std::clamp(counted, 0, missing);
-            } else if (missing > 0) {
-                trips.lost_requests += missing;
-            }
-            missing = 0;
-            counter = now;
-            has_counter = true;
-        }
-        due_ns = std::max(due_ns + options.period_ns, link::monotonic_ns());
-        const timespec until = link::to_timespec(due_ns);
-        clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr);
-    }
-    trips.lost_requests += missing;
-    std::ranges::sort(trips.ns);
-    return trips;
-}
 
 /// A bar for each duration, in steps of a factor of two.
 std::string histogram(const Trips& trips) {
@@ -130,11 +72,17 @@ std::string interface_to(const std::string& host) {
 double us(std::int64_t ns) { return static_cast<double>(ns) / 1e3; }
 
 std::string report_text(const std::string& host, const CardIdentity& card, const Trips& trips) {
-    const int lost = trips.lost_requests + trips.lost_replies;
-    std::string text = fmt::format(
-        "{} at {}\n{} of {} requests answered; lost: {} requests, {} replies ({:.2f} %)\n",
-        card.name, host, trips.ns.size(), trips.sent, trips.lost_requests, trips.lost_replies,
-        100.0 * lost / std::max(1, trips.sent));
+    const int lost = trips.lost_requests + trips.lost_replies + trips.lost;
+    std::string text = fmt::format("{} at {}\n{} of {} requests answered", card.name, host,
+                                   trips.ns.size(), trips.sent);
+    if (trips.late > 0) {
+        text += fmt::format(", {} of them later than --timeout", trips.late);
+    }
+    text += fmt::format("; lost: {} requests, {} replies", trips.lost_requests, trips.lost_replies);
+    if (trips.lost > 0) {
+        text += fmt::format(", {} requests or replies", trips.lost);
+    }
+    text += fmt::format(" ({:.2f} %)\n", 100.0 * lost / std::max(1, trips.sent));
     if (!trips.ns.empty()) {
         text += fmt::format(
             "round trip: 50 % within {:.0f} us, 99 % within {:.0f} us, longest {:.0f} us\n\n{}",
@@ -146,10 +94,11 @@ std::string report_text(const std::string& host, const CardIdentity& card, const
 std::string report_json(const std::string& host, const CardIdentity& card, const Trips& trips) {
     const bool has_trips = !trips.ns.empty();
     return fmt::format(
-        R"({{"host":{},"name":{},"sent":{},"answered":{},"lost_requests":{},"lost_replies":{},"p50_ns":{},"p99_ns":{},"max_ns":{},"interface":{}}})"
+        R"({{"host":{},"name":{},"sent":{},"answered":{},"late":{},"lost_requests":{},"lost_replies":{},"lost":{},"p50_ns":{},"p99_ns":{},"max_ns":{},"interface":{}}})"
         "\n",
-        json_text(host), json_text(card.name), trips.sent, trips.ns.size(), trips.lost_requests,
-        trips.lost_replies, has_trips ? fmt::to_string(trips.at(0.5)) : "null",
+        json_text(host), json_text(card.name), trips.sent, trips.ns.size(), trips.late,
+        trips.lost_requests, trips.lost_replies, trips.lost,
+        has_trips ? fmt::to_string(trips.at(0.5)) : "null",
         has_trips ? fmt::to_string(trips.at(0.99)) : "null",
         has_trips ? fmt::to_string(trips.ns.back()) : "null", json_text(interface_to(host)));
 }
@@ -167,7 +116,8 @@ int run_mesa_doctor(const MesaDoctorOptions& options) {
         problem = read_name(card, identity);
     }
     if (!problem.empty()) return fail(options, problem);
-    const Trips trips = measure(card, options);
+    const Trips trips =
+        RoundTrips(card, options.period_ns, options.timeout_ns).measure(options.count);
     const std::string& host = options.words[0];
     if (options.json) return exit_code(print(report_json(host, identity, trips)));
     if (!print(report_text(host, identity, trips))) return 1;
