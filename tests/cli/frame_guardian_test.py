@@ -156,6 +156,19 @@ class FrameGuardian(GuardedMachine, Case):
         errors = self.end(machine, signal.SIGKILL)[1]
         self.assertIn(f"the process has ended after its cycles had stopped; {SENT}", errors)
 
+    def test_each_stop_of_a_suspended_process_has_its_line(self):
+        machine = self.suspended()
+        time.sleep(0.8)  # so long that its thread counts as one that has failed
+        machine.send_signal(signal.SIGCONT)
+        begun = [
+            "guard: sends the stop frames: no cycle has run\n",
+            "guard: sends the stop frames: its function was stopped, or its thread has a fault\n",
+        ]
+        wait_until(lambda: len(self.bus.frames) >= 12, "the frames of the second stop")
+        errors = self.end(machine)[1]
+        for line in begun:
+            self.assertIn(line, errors)
+
     def test_e_stop_stop_and_unload(self):
         machine = self.run_guarded()
         for words in (("setp", "guard.estop", "TRUE"), ("stop",)):

@@ -33,7 +33,7 @@ public:
           transmitter_(transmitter),
           parent_(std::move(parent)),
           previous_(memory.record.last()),
-          reason_(previous_.reason),
+          begun_(previous_),
           stop_count_(memory.followed.load(std::memory_order_acquire)),
           stops_(previous_.status.stops) {
         text_.reserve(4096);
@@ -62,7 +62,7 @@ private:
         const bool was_stopping = previous_.status.phase == Phase::stopping;
         const bool is_requested = memory_.requests.newest().count != stop_count_;
         if (!is_requested && (was_stopping || memory_.requests.holds_any())) {
-            begin(reason_, now);
+            begin(begun_.reason, now);
         } else {
             show(Phase::watching);
         }
@@ -79,7 +79,8 @@ private:
             record.elapsed_ns = transmitter_.elapsed_ns();
             record.unsent = transmitter_.unsent();
         }
-        record.reason = reason_;
+        record.reason = begun_.reason;
+        record.earlier = begun_.earlier;
         record.status.phase = phase;
         record.status.is_ready = is_ready_;
         record.status.sees_bus = transmitter_.sees_bus();
@@ -106,7 +107,7 @@ private:
 
     void begin(StopReason reason, std::int64_t now) {
         had_hung_ = had_hung_ || reason == StopReason::heartbeat;
-        reason_ = reason;
+        begun_.begin(reason);
         begun_ns_ = now;
         ++stops_;
         transmitter_.begin(now);
@@ -201,7 +202,7 @@ private:
     bus::StarvationWatch starvation_;
     const StopRecord previous_;  // of a guardian that was killed
     Phase phase_ = Phase::watching;
-    StopReason reason_;
+    StopRecord begun_;  // its reasons
     bool is_ready_ = false;
     bool had_hung_ = false;  // before the end of the process
     std::uint32_t stop_count_;

@@ -16,7 +16,8 @@ public:
         const std::uint32_t odd = sequence_.load(std::memory_order_relaxed) | 1;
         sequence_.store(odd, std::memory_order_relaxed);
         std::atomic_thread_fence(std::memory_order_release);
-        reason_.store(static_cast<std::uint32_t>(record.reason), std::memory_order_relaxed);
+        const auto reason = static_cast<std::uint32_t>(record.reason);
+        reasons_.store(record.earlier << 4 | reason, std::memory_order_relaxed);
         rounds_.store(record.rounds, std::memory_order_relaxed);
         elapsed_ns_.store(record.elapsed_ns, std::memory_order_relaxed);
         unsent_.store(record.unsent, std::memory_order_relaxed);
@@ -28,8 +29,10 @@ public:
     bool read(StopRecord& record) const noexcept {
         for (int attempt = 0; attempt < 1000; ++attempt) {
             const std::uint32_t before = sequence_.load(std::memory_order_acquire);
+            const std::uint32_t reasons = reasons_.load(std::memory_order_relaxed);
             record = {.status = status(),
-                      .reason = static_cast<StopReason>(reason_.load(std::memory_order_relaxed)),
+                      .reason = static_cast<StopReason>(reasons & 0xf),
+                      .earlier = reasons >> 4,
                       .rounds = rounds_.load(std::memory_order_relaxed),
                       .elapsed_ns = elapsed_ns_.load(std::memory_order_relaxed),
                       .unsent = unsent_.load(std::memory_order_relaxed)};
@@ -51,7 +54,7 @@ public:
 private:
     std::atomic<std::uint32_t> sequence_{0};
     std::atomic<std::uint32_t> status_{Status{}.word()};
-    std::atomic<std::uint32_t> reason_{0};
+    std::atomic<std::uint32_t> reasons_{0};  ///< the newest in the low four bits
     std::atomic<std::uint32_t> rounds_{0};
     std::atomic<std::int64_t> elapsed_ns_{0};
     std::atomic<std::uint32_t> unsent_{0};

@@ -45,9 +45,26 @@ struct Status {
 struct StopRecord {
     Status status;
     StopReason reason = StopReason::none;  ///< of the last stop
+    std::uint32_t earlier = 0;             ///< reasons of those before, four bits each
     std::uint32_t rounds = 0;              ///< sent in it
     std::int64_t elapsed_ns = 0;           ///< from its begin to the last frame
     std::uint32_t unsent = 0;              ///< a bit for each frame of the last attempt
+
+    static constexpr unsigned max_earlier = 7;
+
+    /// A stop begins.
+    void begin(StopReason next) noexcept {
+        earlier = earlier << 4 | static_cast<std::uint32_t>(reason);
+        earlier &= (1U << 4 * max_earlier) - 1;
+        reason = next;
+    }
+    /// Returns the record of the begin of the `n`th stop before the last one, 1..max_earlier.
+    StopRecord before(unsigned n) const noexcept {
+        StopRecord record;
+        record.status = status;
+        record.reason = static_cast<StopReason>(earlier >> 4 * (n - 1) & 0xf);
+        return record;
+    }
 };
 
 }  // namespace hal::guardian

@@ -32,6 +32,26 @@ TEST(SharedRecord, Has_parts_of_the_same_moment) {
     guardian.join();
 }
 
+TEST(SharedRecord, Keeps_the_reasons_of_stops_that_others_have_followed) {
+    StopRecord record;
+    record.begin(StopReason::heartbeat);
+    record.begin(StopReason::estop);
+    record.begin(StopReason::fault);
+    SharedRecord shared;
+    shared.write(record);
+    StopRecord read;
+    ASSERT_TRUE(shared.read(read));
+    EXPECT_EQ(read.reason, StopReason::fault);
+    EXPECT_EQ(read.before(1).reason, StopReason::estop);
+    EXPECT_EQ(read.before(2).reason, StopReason::heartbeat);
+    for (unsigned n = 0; n < StopRecord::max_earlier; ++n) {
+        record.begin(StopReason::unload);
+    }
+    shared.write(record);
+    ASSERT_TRUE(shared.read(read));
+    EXPECT_EQ(read.before(StopRecord::max_earlier).reason, StopReason::fault);
+}
+
 TEST(Status, Is_one_word) {
     const Status status{.phase = Phase::ended,
                         .outcome = Outcome::delayed,

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <atomic>
 #include <cstdio>
 #include <iterator>
@@ -195,7 +196,7 @@ private:
         const hal::bus::StopRequests::Request request = own_memory_.requests.newest();
         if (request.count != stop_count_) {
             stop_count_ = request.count;
-            own_stop_.reason = request.reason;
+            own_stop_.begin(request.reason);
             ++status.stops;
             status.phase = Phase::stopping;
             local_->begin(now);
@@ -366,6 +367,7 @@ private:
         const auto tell = [&](Event event) { reporter_.tell({.event = event, .stop = stop}); };
         const bool is_new = now.stops != shown_.stops;
         if (is_new) {
+            report_earlier(stop);
             tell(Event::stopping);
         }
         if (is_new || now.outcome != shown_.outcome) {
@@ -386,6 +388,14 @@ private:
             tell(stalls ? Event::guardian_stalls : Event::guardian_runs);
         }
         shown_ = now;
+    }
+    /// Reports stops that another one has followed since the last call.
+    void report_earlier(const StopRecord& newest) noexcept {
+        const auto begun = static_cast<std::uint16_t>(newest.status.stops - shown_.stops);
+        const unsigned unreported = begun - 1U;
+        for (unsigned n = std::min(unreported, StopRecord::max_earlier); n > 0; --n) {
+            reporter_.tell({.event = Event::stopping, .stop = newest.before(n)});
+        }
     }
     /// A stop that is tried again reports its link itself.
     static bool is_stopping(const Status& status) noexcept {
