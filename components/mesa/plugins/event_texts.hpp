@@ -26,6 +26,7 @@ enum class Event : std::uint8_t {
     encoder_gap,
     remote_lost,
     remote_online,
+    period_too_long,
     hold_too_long,
     timeout_too_long,
     module_unused,
@@ -72,6 +73,9 @@ inline constexpr bus::EventRow<Event> event_rows[] = {
     {Event::remote_lost, bus::Effect::raises,
      "{remote} does not answer[; check its cable and its field power]"},
     {Event::remote_online, bus::Effect::ends, "{remote} answers again"},
+    {Event::period_too_long, bus::Effect::none,
+     "the period is {value} us, longer than watchdog.timeout_ns: the watchdog of {card} bites "
+     "between two cycles; raise watchdog.timeout_ns"},
     {Event::hold_too_long, bus::Effect::none,
      "hold-cycles is {value} ms, longer than watchdog.timeout_ns: the watchdog of {card} bites "
      "before the card counts as lost; lower hold-cycles"},

@@ -324,7 +324,12 @@ private:
     void check_hold(std::int64_t period_ns) noexcept {
         const std::int64_t hold_ns = period_ns * std::int64_t{hold_cycles_};
         const std::int64_t timeout_ns = timeout_ns_;
-        const bool is_too_long = hold_ns > timeout_ns;
+        const bool is_too_slow = period_ns > timeout_ns;
+        if (is_too_slow && !is_too_slow_) {
+            tell({Event::period_too_long, 0, period_ns / 1000});
+        }
+        is_too_slow_ = is_too_slow;
+        const bool is_too_long = hold_ns > timeout_ns && !is_too_slow;
         if (is_too_long && !holds_too_long_) {
             tell({Event::hold_too_long, 0, hold_ns / 1'000'000});
         }
@@ -702,6 +707,7 @@ private:
     bool may_have_reset_ = false;  // such a datagram had no answer
     bool was_lost_ = false;
     bool has_told_bite_ = false;  // that awaits its acknowledgment
+    bool is_too_slow_ = false;
     bool holds_too_long_ = false;
     bool runs_on_too_long_ = false;
     unsigned unwritten_cycles_ = 0;  // of read without write

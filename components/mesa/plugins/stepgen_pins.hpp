@@ -183,7 +183,8 @@ public:
     /// [realtime] read
     void receive(std::uint32_t accumulator, std::uint32_t mode, const Reading& reading) noexcept {
         if (!has_begun_ && has_run_) {
-            lose_position();  // a reload: whether the motor stood meanwhile is unknown
+            // a reload: whether the motor stood meanwhile is unknown
+            is_lost_by_reload_ = lose_position();
         }
         has_begun_ = true;
         has_run_ = true;
@@ -256,6 +257,9 @@ public:
 
     /// [realtime] write
     void transmit(Outgoing& out, const Writing& writing) noexcept {
+        if (std::exchange(is_lost_by_reload_, false) && enable_) {
+            has_run_on_ = true;
+        }
         if (!enable_) {
             needs_edge_ = false;
             holds_settings_ = false;
@@ -467,6 +471,7 @@ private:
     bool needs_edge_ = false;  ///< it stands until its enable is FALSE
     bool is_lost_ = false;  ///< until it is enabled again behind that
     bool has_run_on_ = false;
+    bool is_lost_by_reload_ = false;  ///< until the next write, which knows its enable
     bool is_unseen_ = false;  ///< no answer since the card was lost
     double unseen_run_s_ = 0.0;  ///< how long it may go on
     double scale_ = 1.0;  ///< that applies
