@@ -420,7 +420,7 @@ TEST(OrderedHold, Gives_the_outcome_of_each_try_back_and_orders_the_calls_within
     EXPECT_EQ(waited, (std::vector<std::uint64_t>{0, 1, 2, 3, 4}));
 }
 
-/// A card that has nothing to say.
+/// A card that does not answer.
 struct SilentCard final : datagram::Server {
     int requests = 0;
     void serve(std::span<const std::uint8_t>, std::int64_t, datagram::Replies&) noexcept override {

@@ -158,7 +158,7 @@ class FrameGuardian(GuardedMachine, Case):
 
     def test_each_stop_of_a_suspended_process_has_its_line(self):
         machine = self.suspended()
-        time.sleep(0.8)  # so long that its thread counts as one that has failed
+        time.sleep(0.8)  # its thread counts as one that has failed
         machine.send_signal(signal.SIGCONT)
         begun = [
             "guard: sends the stop frames: no cycle has run\n",
