@@ -38,6 +38,7 @@ class Drive:
         self.slave = slave  # held open: the master end reads EIO while nobody has it
         tty.setraw(slave)
         tty.setraw(self.master)
+        self.link = link
         if os.path.islink(link):
             os.unlink(link)
         os.symlink(os.ttyname(slave), link)
@@ -90,5 +91,7 @@ class Drive:
             return
         self.ended = True
         self.thread.join()
+        if os.path.islink(self.link) and os.readlink(self.link) == os.ttyname(self.slave):
+            os.unlink(self.link)  # the next terminal of another test may have this one's number
         os.close(self.master)
         os.close(self.slave)
