@@ -174,8 +174,10 @@ def require_writable(*files):
 
 
 def require_hal():
-    """Returns the program: $HAL_BIN, or `hal` of the PATH. Ends this program when it is missing."""
-    hal = os.environ.get("HAL_BIN", "hal")
+    """Returns the program: $HAL_BIN, `hal` of the PATH, or ./hal of this clone. Ends this program when it is missing."""
+    of_clone = Path(__file__).resolve().parent.parent / "hal"
+    is_only_one = not shutil.which("hal") and os.access(of_clone, os.X_OK)
+    hal = os.environ.get("HAL_BIN", str(of_clone) if is_only_one else "hal")
     if not shutil.which(hal):
         sys.exit(f"'{hal}' is missing or not executable; set HAL_BIN=/path/to/hal")
     return hal

@@ -16,8 +16,10 @@ if [ "$(id -u)" != 0 ]; then
 fi
 if [ -n "${HAL_BRING_UP:-}" ]; then mount -t tmpfs tmpfs /run; fi
 
-hal=${HAL:-hal}
-command -v "$hal" >/dev/null || { report "there is no '$hal'; set HAL=/path/to/hal" >&2; exit 1; }
+hal=${HAL_BIN:-${HAL:-hal}}
+of_clone=$(dirname "$(realpath "${BASH_SOURCE[0]}")")/../../hal
+if [ "$hal" = hal ] && ! command -v hal >/dev/null && [ -x "$of_clone" ]; then hal=$of_clone; fi
+command -v "$hal" >/dev/null || { report "'$hal' is missing or not executable; set HAL_BIN=/path/to/hal" >&2; exit 1; }
 case $hal in */*) hal=$(realpath -s "$hal") ;; esac  # a machine runs in another folder
 switch=hal-$machine-switch
 pids=()
