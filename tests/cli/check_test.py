@@ -140,6 +140,18 @@ class Check(Case):
             said.stderr,
         )
 
+    def test_a_component_that_needs_its_hardware_can_be_assumed(self):
+        self.write(
+            "c.hal",
+            "loadrt modbus config=far.modbus\naddf modbus.0.receive t\nloadrt and2 names=a\n"
+            "net s modbus.0.ready => a.in0\nnet u a.out => a.in7\n",
+        )
+        self.assertIn("far.modbus", self.bad("check", "c.hal"))
+        said = self.bad("check", "--assume", "modbus", "c.hal")
+        self.assertNotIn("far.modbus", said)
+        self.assertIn("unknown pin 'a.in7'", said)
+        self.assertIn("on 'modbus', which is assumed to exist", said)
+
     def test_files_of_the_library(self):
         self.write("x.ini", "[HAL]\nHALFILE = LIB:nowhere.hal\n")
         self.assertIn(

@@ -325,7 +325,7 @@ std::optional<Absences::Cause> accepted_absence(Elaboration& on, const Token& na
                                                 bool known) {
     Absences& absences = on.edit.absences();
     std::optional<Absences::Cause> cause;
-    if (!known || origin == Origin::linuxcnc) {
+    if (!known || origin == Origin::linuxcnc || on.check_only) {
         cause = absences.assumed(name.text);
     }
     if (cause || !on.check_only || !is_unchecked(on, name, origin)) return cause;
