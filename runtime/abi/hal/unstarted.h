@@ -16,7 +16,7 @@ extern "C" {
 
 typedef struct hal_unstarted {
     uint32_t size;
-    /* Returns the first argument that is no option of the last program of this name; NULL when
+    /* Returns the first argument behind the options of the last program of this name; NULL when
        there is none. The text stays until the instance is created. [setup] */
     const char *(*argument)(const hal_host *, const char *program);
 } hal_unstarted;
