@@ -19,6 +19,7 @@
 #include "hal/background.hpp"
 #include "hal/clock.hpp"
 #include "hal/component.hpp"
+#include "hal/journal.hpp"
 #include "hal/lasting_fault.hpp"
 #include "hal/naming.hpp"
 #include "hal/queue.hpp"
@@ -79,6 +80,7 @@ public:
     void start() {
         faults_ = hal::extension<hal_faults>("hal.faults/1");
         raised_ = FrameError::none;
+        const hal::JournaledSource journaled;
         background_.start();
     }
     void stop() noexcept {
@@ -94,8 +96,8 @@ public:
             ordered_ = order;
             orders_.put(order);
         }
-        bool fresh = false;
-        const Delivery& d = deliveries_.get(&fresh);
+        const bool fresh = take_delivery();
+        const Delivery& d = delivery_;
         if (began_ns_ == no_time) {
             began_ns_ = cycle.start_ns();
         }
@@ -170,6 +172,18 @@ private:
         next_.status = status;
         deliveries_.put(next_);
     }
+    /// Takes the newest delivery, which is in the journal. Returns false when there is none since the
+    /// last cycle. [realtime]
+    bool take_delivery() noexcept {
+        bool fresh = false;
+        const Delivery& newest = deliveries_.get(&fresh);
+        hal::journaled(fresh);
+        if (fresh) {
+            delivery_ = newest;
+            hal::journaled(delivery_);
+        }
+        return fresh;
+    }
     void raise(FrameError now) noexcept {
         static constexpr const char* reasons[frame_error_count] = {
             "",
@@ -200,6 +214,7 @@ private:
     bool measures_ = false;  // of the helper thread
     hal::Mailbox<Delivery> deliveries_;  // helper thread to cycle
     hal::Mailbox<Ordered> orders_;  // cycle to helper thread
+    Delivery delivery_;  // the newest one that the cycle has taken
     Ordered ordered_;
     std::int64_t began_ns_ = no_time;
     const hal_faults* faults_ = nullptr;

@@ -10,16 +10,11 @@ from harness import HAL, ROOT, SANITIZED, Case, wait_until
 # Components of which a journal cannot be executed from a state, and what `hal replay` prints. A new component
 # belongs here only when what it computes is not a function of its inputs and of its links.
 OPENS = r"'{instance}' \({name}\) opens again: "
-HELPERS = r"'{instance}' \({name}\) has \d helper threads?, whose data are not in the journal"
 WITHOUT_STATE = {
     "dds_publish": OPENS,
     "dds_subscribe": OPENS,
     "node": OPENS,
     "segment_record": OPENS,
-    "vision_blob": HELPERS,
-    "vision_line": HELPERS,
-    "vision_marker": HELPERS,
-    "vision_pendulum": HELPERS,
 }
 THREAD = "loadrt threads name1=servo period1=2000000\n"
 WRITABLE = re.compile(r"(?m)^\s*\S+\s+(bit|float|s32|u32)\s+(?:IN|I/O)\s+\S+\s+(\S+)$")

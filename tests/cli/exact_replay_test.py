@@ -15,7 +15,7 @@ import subprocess
 import sys
 import unittest
 
-from harness import HAL, PLUGINS, ROOT, SANITIZED, SERVO, TIMEOUT, Case, wait_until
+from harness import HAL, PLUGINS, ROOT, SANITIZED, SERVO, TIMEOUT, Case, needs_package, wait_until
 
 # Three threads that read each other: jitter and missed periods decide which cycles they read. The
 # execution time of a thread is a value like any other.
@@ -920,6 +920,32 @@ net place wave.sine => hold.x-0
         done = self.run_program("replay", "--exact", "run.mcap", "--show", "hold.designs")
         self.assertEqual((0, ""), (done.returncode, done.stderr))
         self.assertRegex(done.stdout, r"no difference, \d{4,} values compared\nhold.designs 5\n")
+
+    @needs_package("vision")
+    @unittest.skipIf(SANITIZED, "a sanitizer has the functions of the clock")
+    def test_what_a_camera_has_seen_is_recorded(self):
+        machine = self.run_journaled(
+            """loadrt threads name1=servo period1=1000000
+loadrt siggen names=wave
+loadrt vision_scene show=furuta
+loadrt vision_pendulum source=sim:furuta
+addf wave.update servo
+addf vision-scene.0.update servo
+addf vision-pendulum.0.update servo
+net arm wave.sine => vision-scene.0.arm-angle
+""",
+            "--values",
+            "*",
+        )
+        wait_until(lambda: int(self.value("vision-pendulum.0.frames")) > 20, "pictures")
+        self.give(["setp vision-scene.0.unplugged TRUE"])
+        self.comes("vision-pendulum.0.error-code", "3")
+        self.finish(machine)
+        text = self.replay("--show", "vision-pendulum.0.error-code")
+        self.assertNotIn("not in the journal", text)
+        self.assertRegex(
+            text, r"no difference, \d{4,} values compared\nvision-pendulum.0.error-code 3\n"
+        )
 
     @unittest.skipIf(SANITIZED, "a sanitizer has the functions of the clock")
     def test_a_component_gets_the_time_that_it_has_read(self):
