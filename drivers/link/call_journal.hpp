@@ -12,6 +12,8 @@
 #include <string>
 #include <type_traits>
 
+#include <pthread.h>
+
 #include "hal/journal.hpp"
 
 // Defined by a program with journals (runtime/machine/run/setup_journal.cpp), null in others, as those
@@ -23,6 +25,8 @@ extern "C" {
 [[gnu::weak, gnu::visibility("default")]] int hal_journal_hide(int hidden) noexcept;
 /// Notes that an ordered call begins; when executed again, waits for those before it.
 [[gnu::weak, gnu::visibility("default")]] void hal_journal_order() noexcept;
+/// Returns the thread of the machine whose cycle calls; 0: none.
+[[gnu::weak, gnu::visibility("default")]] unsigned hal_journal_thread() noexcept;
 }
 
 namespace hal::link {
@@ -32,6 +36,13 @@ enum class JournalMode : std::uint8_t { none, records, executes_again };
 /// Returns what the journal does with calls of the calling thread. [any]
 inline JournalMode journal_mode() noexcept {
     return hal_journal_mode ? static_cast<JournalMode>(hal_journal_mode()) : JournalMode::none;
+}
+
+/// Returns what identifies the calling thread of the machine, also in a re-execution, which runs the
+/// cycles of all threads on one. [any]
+inline pthread_t calling_thread() noexcept {
+    const unsigned thread = hal_journal_thread ? hal_journal_thread() : 0;
+    return thread != 0 ? pthread_t{thread} : pthread_self();
 }
 
 /// The driver's own readings of clocks are not recorded while this exists.

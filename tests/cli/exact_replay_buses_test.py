@@ -95,6 +95,24 @@ addf tdma.0.receive servo
 addf tdma.0.transmit servo
 """
 
+# Links of the fast thread send in the slots of stations of the other one.
+SLOTS_OF_ANOTHER_THREAD = """loadrt threads name1=fast period1=200000 policy1=other supervise1=60s name2=servo period2=1000000 policy2=other supervise2=60s
+loadrt tdma link=sim:cell/clock,sim:cell/a,sim:cell/b station=clock,a,b schedule="master:; name clock; cycle 1000; slave:; name a; slot 0 300; slave:; name b; slot 0 600"
+loadrt can_traffic names=much link=cane:sim:cell/a?slot=0 id=0x200 messages=20 one_node=1
+loadrt can_traffic names=little link=cane:sim:cell/b?slot=0 id=0x300 messages=2 one_node=1
+setp much.period 0.0004
+setp little.period 0.0013
+addf tdma.0.receive servo
+addf tdma.1.receive servo
+addf tdma.2.receive servo
+addf much.update fast
+addf little.update fast
+addf tdma.0.transmit servo
+addf tdma.1.transmit servo
+addf tdma.2.transmit servo
+start
+"""
+
 
 class ExactReplayOfBuses(Case):
     def setUp(self):
@@ -311,6 +329,22 @@ unloadrt can_faults
         nodes = self.start("node", "modbus", settings, "--link", f"pty:{port}", loaded=False)
         wait_until(port.exists, "the port of the nodes")
         self.run_spindle(f"serial:{port}", nodes)
+        self.assertRegex(self.replay(), r"\nno difference, \d{5,} values compared\n$")
+
+    @needs_package("tdma")
+    @unittest.skipIf(SANITIZED, "a station under a sanitizer misses its slots")
+    def test_slots_of_a_station_in_another_thread(self):
+        machine = self.start(
+            "run",
+            self.write("a.hal", SLOTS_OF_ANOTHER_THREAD),
+            *("--journal", "run.mcap", "--values", "*"),
+        )
+        for sender in ("much", "little"):
+            wait_until(lambda: int(self.value(f"{sender}.sent")) > 300, f"frames of {sender}")
+        self.wait_for_cycles("servo", 1000)
+        self.good("shell", given="stop\nstart\n")
+        self.wait_for_cycles("servo", 300)
+        self.finish(machine)
         self.assertRegex(self.replay(), r"\nno difference, \d{5,} values compared\n$")
 
     @needs_package("tdma")

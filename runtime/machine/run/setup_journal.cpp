@@ -245,6 +245,11 @@ extern "C" {
     }
 }
 
+[[gnu::visibility("default")]] unsigned hal_journal_thread() noexcept {
+    const hal::Core* const core = hal::Core::current();
+    return core ? core->id() + 1 : 0;
+}
+
 [[gnu::visibility("default")]] void hal_journal_link(int begins) noexcept {
     hal::SetupJournal* const setup = hal::SetupJournal::current();
     if (!setup) return;

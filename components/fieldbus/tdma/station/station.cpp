@@ -137,8 +137,23 @@ void Station::begin() noexcept {
 /// Drops what is queued: stale frames must not be sent after the next sync. The order matters to
 /// threads in send(), see slots.hpp.
 void Station::stop_sending() noexcept {
-    ready_.store(false, std::memory_order_relaxed);
-    transmitter_.clear_slots();
+    may_queue_ = false;
+    core_.has_stale_frames = true;
+    open_queues();
+}
+
+/// Shows senders whether they may queue frames, and drops stale ones. While another thread has the
+/// queues, the next cycle does that.
+void Station::open_queues() noexcept {
+    if (!core_.has_stale_frames && may_queue_ == ready_.load(std::memory_order_relaxed)) return;
+    const link::OrderedCall call(core_.order, link::OrderedCall::Wait::bounded);
+    if (!call.is_made()) return;
+    if (core_.has_stale_frames) {
+        ready_.store(false, std::memory_order_relaxed);
+        transmitter_.clear_slots();
+        core_.has_stale_frames = false;
+    }
+    ready_.store(may_queue_, std::memory_order_relaxed);
 }
 
 /// Starts anew in a cycle that has begun.
@@ -158,34 +173,52 @@ void Station::restart() noexcept { begin(); }
 void Station::become(State state) noexcept {
     core_.status.state = state;
     if (state != State::running) return stop_sending();
-    ready_.store(true, std::memory_order_relaxed);
+    may_queue_ = true;
+    open_queues();
     report(Event::running);
 }
 
 std::uint64_t Station::dropped(const ethernet::Statistics& port) const noexcept {
-    return rejected_.load(std::memory_order_relaxed) + core_.status.count.cleared + port.dropped;
+    std::uint64_t rejected = rejected_.load(std::memory_order_relaxed);
+    link::JournaledCall call;
+    call.number(rejected);
+    return rejected + core_.status.count.cleared + port.dropped;
 }
 
 std::size_t Station::waiting(unsigned slot) const noexcept {
     const Slot* s = transmitter_.find(slot);
-    return s == nullptr ? 0 : s->waiting();
+    if (s == nullptr) return 0;
+    return link::ordered_value(core_.order, [s] { return s->waiting(); },
+                               [](link::JournaledCall& call, auto& count) { call.number(count); });
 }
 
 std::size_t Station::capacity(unsigned slot) const noexcept {
-    const Slot* s = transmitter_.find(slot);
-    return s == nullptr ? 0 : s->capacity();
+    const auto read = [&] {
+        const Slot* s = transmitter_.find(slot);
+        return s == nullptr ? std::size_t{0} : s->capacity();
+    };
+    return link::ordered_value(core_.order, read,
+                               [](link::JournaledCall& call, auto& bytes) { call.number(bytes); });
+}
+
+bool Station::ready() const noexcept {
+    return link::ordered_value(core_.order, [this] {
+        return ready_.load(std::memory_order_relaxed);
+    }, [](link::JournaledCall& call, bool& is_ready) { call.number(is_ready); });
 }
 
 ethernet::Sent Station::send(std::span<const std::uint8_t> frame, unsigned slot, unsigned priority,
                              ethernet::Finisher* finisher) noexcept {
     using enum ethernet::Sent;
+    const link::OrderedCall call(core_.order, link::OrderedCall::Wait::bounded);
+    if (!call.is_made()) return full;  // another thread has the queues: the sender keeps it
     const Transmitter::Target to = transmitter_.target(slot);  // before ready()
     Slot* const s = to.slot;
     ethernet::Sent result = queued;
     if (s == nullptr || frame.size() < ethernet::header_bytes ||
         frame.size() > ethernet::header_bytes + s->capacity()) {
         result = rejected;
-    } else if (!ready()) {
+    } else if (!ready_.load(std::memory_order_relaxed)) {
         result = down;
     } else if (!s->push(frame, std::min(priority, last_priority), finisher, to.epoch)) {
         result = full;
@@ -200,8 +233,9 @@ ethernet::Sent Station::send(std::span<const std::uint8_t> frame, unsigned slot,
 // Received frames.
 
 void Station::receive(Time now) noexcept {
-    core_.thread.store(pthread_self(), std::memory_order_relaxed);
+    core_.thread.store(link::calling_thread(), std::memory_order_relaxed);
     if (core_.port == nullptr) return;
+    open_queues();
     const Time absence = now - std::exchange(last_cycle_, now);
     const Time max_pause = std::max<Time>(max_absence, core_.setup.lost_limit * core_.setup.cycle);
     if (core_.status.leading && absence > max_pause) {

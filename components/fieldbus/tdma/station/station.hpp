@@ -106,7 +106,7 @@ public:
     void count_dropped() noexcept override { rejected_.fetch_add(1, std::memory_order_relaxed); }
     /// Returns true while the syncs of a second master are received. [realtime]
     bool hears_second_master() const noexcept { return other_masters_.present(); }
-    bool ready() const noexcept override { return ready_.load(std::memory_order_relaxed); }
+    bool ready() const noexcept override;
     const Address& address() const noexcept override { return core_.address; }
 
 private:
@@ -121,6 +121,7 @@ private:
     void begin() noexcept;
     void begin_at(Time now) noexcept;
     void stop_sending() noexcept;
+    void open_queues() noexcept;
     void become(State) noexcept;
     void report(Event event, const Address& who = {}, Time value = 0) noexcept {
         core_.report(event, who, value);
@@ -179,6 +180,7 @@ private:
     Pings pings_;
     Transmitter transmitter_{core_, calibration_, pings_, slot_monitor_.roster()};
     std::atomic<bool> ready_{false};
+    bool may_queue_ = false;  // what ready_ becomes
     /// frames that send() rejected, or its caller dropped, in any thread
     std::atomic<std::uint64_t> rejected_{0};
 

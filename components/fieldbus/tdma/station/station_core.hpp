@@ -2,9 +2,8 @@
 // What the parts of a station share: its part of the schedule, its state, the global clock, and the
 // grid of cycles in global time. Only the station's thread changes them. Other threads read
 // `thread`, and `address` and `setup.others`, which stay the same while the station has a port.
+// Under a journal all threads take turns with `order` at the queues of the slots.
 #pragma once
-
-#include <pthread.h>
 
 #include <algorithm>
 #include <atomic>
@@ -12,6 +11,7 @@
 
 #include "clock_estimate.hpp"
 #include "discipline/discipline.hpp"
+#include "link/call_order.hpp"
 #include "station_setup.hpp"
 
 namespace hal::tdma {
@@ -68,6 +68,9 @@ struct StationCore {
     ethernet::Port* port = nullptr;
     Events* events = nullptr;
     std::atomic<pthread_t> thread{};  ///< that of receive()
+    mutable link::CallOrder order;  ///< of the calls of all threads on the queues
+    /// The station has stopped sending, and frames queued before that are still to be dropped.
+    bool has_stale_frames = false;
 
     void report(Event event, const Address& who = {}, Time value = 0) noexcept {
         if (events != nullptr) {
@@ -76,7 +79,7 @@ struct StationCore {
     }
     /// Returns true in the thread of receive(). [any]
     bool is_own_thread() const noexcept {
-        return thread.load(std::memory_order_relaxed) == pthread_self();
+        return thread.load(std::memory_order_relaxed) == link::calling_thread();
     }
     /// Returns true when the station runs and knows the present cycle.
     bool runs() const noexcept { return status.state == State::running && grid_known; }

@@ -146,22 +146,34 @@ bool Transmitter::calibrates(const Slot& slot, std::uint32_t cycle, Time local_a
     return true;
 }
 
+/// Takes the next frame of a slot. Returns false when there is none, when it needs more than `space`
+/// bytes on the line, or while another thread has the queues.
+bool Transmitter::take(Slot& slot, std::size_t space) noexcept {
+    const link::OrderedCall call(core_.order, link::OrderedCall::Wait::bounded);
+    if (!call.is_made() || core_.has_stale_frames) return false;
+    const std::span frame = slot.front();
+    if (frame.empty() || ethernet::wire_bytes(frame.size()) > space) return false;
+    std::copy(frame.begin(), frame.end(), outgoing_.bytes.begin());
+    outgoing_.length = frame.size();
+    outgoing_.finisher = slot.finisher();
+    slot.pop();
+    return true;
+}
+
 void Transmitter::send_slot(std::size_t index, std::uint32_t cycle) noexcept {
     Slot& slot = slots_[index];
     const Time at = core_.clock.local(core_.start_of(cycle) + slot.setup().offset);
     if (index == 0 && calibrates(slot, cycle, at)) return;
     if (core_.status.state != State::running) return;
     std::size_t used = 0;
-    for (auto frame = slot.front(); !frame.empty(); frame = slot.front()) {
-        const std::size_t bytes = ethernet::wire_bytes(frame.size());
-        if (used + bytes > slot.turn_bytes()) break;
+    while (take(slot, slot.turn_bytes() - used)) {
+        const std::span frame(outgoing_.bytes.data(), outgoing_.length);
         if (launch(frame, {.at_ns = at + core_.wire_time(used),
                            .guard_ns = core_.setup.guard,
-                           .finisher = slot.finisher()})) {
+                           .finisher = outgoing_.finisher})) {
             ++core_.status.count.sent;
         }
-        slot.pop();
-        used += bytes;
+        used += ethernet::wire_bytes(frame.size());
     }
     core_.status.count.cleared += slot.take_dropped();
     send_pings(slot, at, used);

@@ -60,6 +60,12 @@ private:
         std::uint32_t cycle = 0;
         bool used = false;
     };
+    /// A frame that has left its queue.
+    struct Outgoing {
+        std::array<std::uint8_t, ethernet::max_frame> bytes;
+        std::size_t length = 0;
+        ethernet::Finisher* finisher = nullptr;
+    };
     /// A slot, or the sync, that is due.
     struct Turn {
         Time at;
@@ -75,6 +81,7 @@ private:
     void send_sync(std::uint32_t cycle, Time global_at) noexcept;
     void send_replies() noexcept;
     void send_slot(std::size_t index, std::uint32_t cycle) noexcept;
+    bool take(Slot&, std::size_t space) noexcept;
     bool calibrates(const Slot&, std::uint32_t cycle, Time local_at) noexcept;
     void send_request(const Slot&, std::uint32_t cycle, Time local_at) noexcept;
     void send_pings(const Slot&, Time local_at, std::size_t used) noexcept;
@@ -97,6 +104,7 @@ private:
     const Roster& roster_;
     std::deque<Slot> slots_;  // in the order of the setup: calibration uses the first
     std::atomic<std::uint32_t> epoch_{0};  // of the slots; written by the station's thread
+    Outgoing outgoing_{};  // what take() has taken
     std::array<Reply, 64> replies_{};  // as many as RTnet's master
     Time sent_until_ = 0;  // global; slots up to here are done
     bool sent_any_ = false;
