@@ -12,7 +12,8 @@ using Mesa = hal::mesa::MesaComponent<mesa_names>;
 
 }  // namespace
 
-HAL_COMPONENT(Mesa, "mesa", "Mesa Ethernet cards (7I92, 7I96S, 7I76E, 7I95, 7I97), HostMot2", R"(
+HAL_COMPONENT(Mesa, "mesa", "Mesa Ethernet cards (7I92, 7I96, 7I96S, 7I76E, 7I95, 7I97), HostMot2",
+              R"(
 Drives a Mesa card with HostMot2 firmware over Ethernet, with the pins, parameters and functions of LinuxCNC's hm2_eth. It needs no privileges and changes no
 firewall. The instance is named after the card, `hm2_7i76e.0`. Its pins depend on the firmware and on `config=`. With an emulated card:
 
