@@ -322,6 +322,16 @@ bool walk_all(const Schema& schema, std::span<const std::uint8_t> bytes, hal_val
     return walk.at_end();
 }
 
+/// Returns geometry_msgs/Twist for geometry_msgs/msg/Twist, the spelling of `ros2 topic list -t`.
+std::string without_msg(std::string_view ros) {
+    constexpr std::string_view folder = "/msg/";
+    std::string name(ros);
+    if (const auto at = name.find(folder); at != std::string::npos) {
+        name.replace(at, folder.size(), "/");
+    }
+    return name;
+}
+
 }  // namespace
 
 Schema Schema::of_fields(std::string_view text, std::string type) {
@@ -354,8 +364,9 @@ Schema Schema::of_fields(std::string_view text, std::string type) {
     return schema;
 }
 
-Schema Schema::of_ros(std::string_view ros, const std::vector<std::string>& names,
+Schema Schema::of_ros(std::string_view written, const std::vector<std::string>& names,
                       std::string_view frame, std::string_view encoding) {
+    const std::string ros = without_msg(written);
     struct Plain {
         std::string_view ros;
         hal_type type;
@@ -377,7 +388,7 @@ Schema Schema::of_ros(std::string_view ros, const std::vector<std::string>& name
         }
     };
     if (const auto p = std::find_if(plain.begin(), plain.end(),
-                                    [ros](const Plain& x) { return x.ros == ros; });
+                                    [&ros](const Plain& x) { return x.ros == ros; });
         p != plain.end()) {
         place(schema, writer, "data", p->type);
     } else if (ros == "geometry_msgs/Twist") {
@@ -399,20 +410,19 @@ Schema Schema::of_ros(std::string_view ros, const std::vector<std::string>& name
         writer.number(0);  // data
         schema.layout += 'q';
     } else {
-        reject("ros", "ros=" + std::string(ros) +
+        reject("ros", "ros=" + std::string(written) +
                           ": unsupported message type; supported are std_msgs/Float64 Bool Int32 "
                           "UInt32 Int64 UInt64, geometry_msgs/Twist " +
                           "WrenchStamped, sensor_msgs/JointState Image; other types that consist "
                           "of plain numbers: fields= and type=");
     }
     if (schema.sample.size() > max_bytes) {
-        reject("ros", "ros=" + std::string(ros) + ": the message exceeds " +
+        reject("ros", "ros=" + std::string(written) + ": the message exceeds " +
                           std::to_string(max_bytes) +
                           " bytes; shorten joints=, frame= or encoding=");
     }
     const auto slash = ros.find('/');
-    schema.type = std::string(ros.substr(0, slash)) +
-                  "::msg::dds_::" + std::string(ros.substr(slash + 1)) + "_";
+    schema.type = ros.substr(0, slash) + "::msg::dds_::" + ros.substr(slash + 1) + "_";
     return schema;
 }
 

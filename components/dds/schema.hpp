@@ -56,8 +56,9 @@ struct Schema {
     /// Builds a ROS 2 type: std_msgs/Float64 Bool Int32 UInt32 Int64 UInt64, geometry_msgs/Twist
     /// WrenchStamped, sensor_msgs/JointState Image (its header and format, without pixels). `names`
     /// are the joints of a JointState, `frame` the header's frame_id, `encoding` that of an Image.
+    /// ROS 2's spelling with a folder, geometry_msgs/msg/Twist, is the same type.
     /// Throws std::invalid_argument. [setup]
-    static Schema of_ros(std::string_view ros, const std::vector<std::string>& names = {},
+    static Schema of_ros(std::string_view written, const std::vector<std::string>& names = {},
                          std::string_view frame = "", std::string_view encoding = "bgr8");
 };
 

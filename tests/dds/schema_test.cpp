@@ -128,6 +128,15 @@ TEST(Schema, of_ros_uses_the_names_and_fields_of_the_message) {
     EXPECT_EQ("height width step ", names(Schema::of_ros("sensor_msgs/Image")));
 }
 
+TEST(Schema, of_ros_accepts_the_spelling_of_the_ros2_command) {
+    for (const char* const type : {"geometry_msgs/msg/Twist", "geometry_msgs/Twist"}) {
+        const Schema twist = Schema::of_ros(type);
+        EXPECT_EQ("geometry_msgs/Twist", twist.ros);
+        EXPECT_EQ("geometry_msgs::msg::dds_::Twist_", twist.type);
+    }
+    EXPECT_EQ("data ", names(Schema::of_ros("std_msgs/msg/Float64")));
+}
+
 TEST(Schema, of_ros_rejects_invalid_messages_with_the_reason) {
     const auto rejection = [](const char* type,
                               const std::vector<std::string>& joints) -> std::string {
