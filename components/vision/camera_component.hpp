@@ -172,8 +172,8 @@ private:
         next_.status = status;
         deliveries_.put(next_);
     }
-    /// Takes the newest delivery, which is in the journal. Returns false when there is none since the
-    /// last cycle. [realtime]
+    /// Takes the newest delivery, which is in the journal. Returns false when nothing came since
+    /// the last cycle. [realtime]
     bool take_delivery() noexcept {
         bool fresh = false;
         const Delivery& newest = deliveries_.get(&fresh);

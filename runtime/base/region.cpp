@@ -105,14 +105,14 @@ private:
 constinit Chunks chunks;
 
 /// Where the calling thread allocates.
-struct Place {
+struct OpenChunk {
     int scopes = 0;
     char* chunk = nullptr;  // nullptr: none is open
     std::size_t used = 0;  // bytes of it
     std::uint32_t objects = 0;  // in it, beside what other code than release_newest() has freed
 };
 
-constinit thread_local Place place;
+constinit thread_local OpenChunk open_chunk;
 
 /// `alignment` is a power of two.
 std::size_t aligned(std::size_t offset, std::size_t alignment) {
@@ -124,50 +124,52 @@ std::size_t rounded(std::size_t bytes) {
 }
 
 void close_chunk() {
-    if (!place.chunk) return;
-    chunks.close(place.chunk, place.objects);
-    place.chunk = nullptr;
+    if (!open_chunk.chunk) return;
+    chunks.close(open_chunk.chunk, open_chunk.objects);
+    open_chunk.chunk = nullptr;
 }
 
 /// Returns false unless the block is the newest one of the thread's chunk, as of a short-lived
 /// text.
 bool release_newest(char* memory, std::size_t bytes) {
-    const bool is_newest = place.chunk && bytes > 0 && memory >= place.chunk &&
-                           memory + rounded(bytes) == place.chunk + place.used;
+    const bool is_newest = open_chunk.chunk && bytes > 0 && memory >= open_chunk.chunk &&
+                           memory + rounded(bytes) == open_chunk.chunk + open_chunk.used;
     if (!is_newest) return false;
-    place.used = static_cast<std::size_t>(memory - place.chunk);
-    --place.objects;
+    open_chunk.used = static_cast<std::size_t>(memory - open_chunk.chunk);
+    --open_chunk.objects;
     return true;
 }
 
 }  // namespace
 
 Scope::Scope() noexcept {
-    if (place.scopes > 0 || chunks.reserve()) {
-        ++place.scopes;
+    if (open_chunk.scopes > 0 || chunks.reserve()) {
+        ++open_chunk.scopes;
     }
 }
 
 Scope::~Scope() {
-    if (place.scopes == 0) return;
-    --place.scopes;
-    if (place.scopes == 0) {
+    if (open_chunk.scopes == 0) return;
+    --open_chunk.scopes;
+    if (open_chunk.scopes == 0) {
         close_chunk();
     }
 }
 
 void* allocate(std::size_t bytes, std::size_t alignment) noexcept {
-    if (place.scopes == 0 || bytes > max_block || alignment > max_alignment) return nullptr;
-    std::size_t begin = aligned(place.used, alignment);
-    if (!place.chunk || begin + rounded(bytes) > chunk_bytes) {
+    if (open_chunk.scopes == 0 || bytes > max_block || alignment > max_alignment) return nullptr;
+    std::size_t begin = aligned(open_chunk.used, alignment);
+    if (!open_chunk.chunk || begin + rounded(bytes) > chunk_bytes) {
         close_chunk();
-        place = {.scopes = place.scopes, .chunk = chunks.open()};
-        if (!place.chunk) return nullptr;
+        open_chunk.chunk = chunks.open();
+        open_chunk.used = 0;
+        open_chunk.objects = 0;
+        if (!open_chunk.chunk) return nullptr;
         begin = 0;
     }
-    place.used = begin + rounded(bytes);
-    ++place.objects;
-    return place.chunk + begin;
+    open_chunk.used = begin + rounded(bytes);
+    ++open_chunk.objects;
+    return open_chunk.chunk + begin;
 }
 
 bool has(const void* memory) noexcept { return chunks.has(memory); }

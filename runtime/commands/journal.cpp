@@ -46,20 +46,20 @@ void command_journal(Context& context) {
     const std::optional<JournalLine> line =
         parse_journal_line(context.command, context.diagnostics);
     if (!line) return;
-    if (!context.shell.note_journal(line->file)) {
+    const SessionOptions& options = context.session.options();
+    const bool may_have_one = context.checking() || options.sink || options.virtual_clock;
+    if (!may_have_one) {
+        context.diagnostics.warning(
+            "ignored-option", context.command.span,
+            "this machine has no journal: it begins with the machine", "",
+            "write the line into a netlist that hal run or hal linuxcnc is given, "
+            "or type: hal run --journal FILE.mcap");
+    } else if (!context.shell.note_journal(line->file)) {
         context.diagnostics.warning("ignored-option", context.command.span,
                                     "a machine has one journal, and an earlier line names another "
                                     "file: this line is ignored",
                                     "", "remove one of the two lines");
-        return;
     }
-    const SessionOptions& options = context.session.options();
-    if (context.checking() || options.sink || options.virtual_clock) return;
-    context.diagnostics.warning(
-        "ignored-option", context.command.span,
-        "this machine has no journal: it begins with the machine", "",
-        "write the line into a netlist that hal run or hal linuxcnc is given, "
-        "or type: hal run --journal FILE.mcap");
 }
 
 }  // namespace hal

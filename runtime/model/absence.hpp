@@ -60,7 +60,7 @@ public:
     void note_program(const std::string& program, const std::vector<std::string>& names,
                       std::vector<std::string> arguments = {});
     bool has_programs() const { return !programs_.empty(); }
-    /// Returns the first argument of the last program of this name; nullptr when there is none.
+    /// Returns the first argument of the last program of this name; nullptr without one.
     const std::string* argument_of(const std::string& program) const;
     /// A netlist that cannot be read: names that it may define are not errors in the texts after
     /// it.

@@ -428,15 +428,22 @@ struct SilentCard final : datagram::Server {
     }
 };
 
-TEST(JournaledDatagram, A_stop_that_the_journal_does_not_have_does_not_wait) {
+/// A stop that is executed again.
+struct JournaledDatagram : testing::Test {
+    void SetUp() override {
+        ASSERT_TRUE(opened) << opened.problem;
+        yields = 0;
+        journal = {};
+        journal.mode = 2;
+    }
+
     SilentCard card;
-    const auto attached = datagram::attach("sim:stopped", card);
-    const auto opened = datagram::open("sim:stopped");
-    ASSERT_TRUE(opened) << opened.problem;
+    decltype(datagram::attach("", card)) attached = datagram::attach("sim:stopped", card);
+    decltype(datagram::open("")) opened = datagram::open("sim:stopped");
     const std::array<std::uint8_t, 4> request{};
-    yields = 0;
-    journal = {};
-    journal.mode = 2;
+};
+
+TEST_F(JournaledDatagram, A_stop_that_the_journal_does_not_have_does_not_wait) {
     EXPECT_FALSE(opened.port->send(request, datagram::unclocked));
     EXPECT_EQ(0U, yields);
     EXPECT_FALSE(journal.hidden);
@@ -445,15 +452,7 @@ TEST(JournaledDatagram, A_stop_that_the_journal_does_not_have_does_not_wait) {
     EXPECT_EQ(1, card.requests);
 }
 
-TEST(JournaledDatagram, A_stop_while_the_card_was_busy_is_executed_with_the_same_tries) {
-    SilentCard card;
-    const auto attached = datagram::attach("sim:stopped", card);
-    const auto opened = datagram::open("sim:stopped");
-    ASSERT_TRUE(opened) << opened.problem;
-    const std::array<std::uint8_t, 4> request{};
-    yields = 0;
-    journal = {};
-    journal.mode = 2;
+TEST_F(JournaledDatagram, A_stop_while_the_card_was_busy_is_executed_with_the_same_tries) {
     journal.data = std::string("\0\0\1", 3) + std::string(sizeof(std::uint64_t), '\7');
     EXPECT_TRUE(opened.port->send(request, datagram::unclocked));
     EXPECT_EQ(journal.data.size(), journal.at);

@@ -117,7 +117,7 @@ class Slaves(Ethercat):
         self.assertIn("error: unknown pin 'lcec.0.y.din-77' [no-such-pin]\n", said)
         (self.folder / "named.hal").write_text("loadusr -W lcec_conf other.xml\nloadrt lcec\n")
         self.assertIn(
-            "config=ethercat-conf.xml: cannot read file 'other.xml': No such file or directory",
+            "lcec_conf: cannot read file 'other.xml': No such file or directory",
             self.bad("check", "named.hal"),
         )
 

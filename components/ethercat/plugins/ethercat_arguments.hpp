@@ -84,7 +84,7 @@ struct EthercatArguments {
         std::string text;
         if (!config::read_from_disk(path, text)) {
             throw hal::ArgumentError(
-                "config", "config=" + file.get() + ": cannot read file '" + path + "': " + text,
+                "config", origin_of(path) + "cannot read file '" + path + "': " + text,
                 lcec_ ? "write its name: loadusr -W lcec_conf FILE.xml, or loadrt lcec "
                         "config=FILE.xml"
                       : "");
@@ -132,6 +132,13 @@ struct EthercatArguments {
     }
 
 private:
+    /// Returns what named the file, as the beginning of an error.
+    std::string origin_of(const std::string& path) const {
+        const bool is_named_elsewhere =
+            lcec_ && file.get() == usual_file_ && !path.ends_with(usual_file_);
+        return is_named_elsewhere ? "lcec_conf: " : "config=" + file.get() + ": ";
+    }
+
     /// Returns the path of the configuration: as written, or for `lcec` that of `lcec_conf`, which
     /// `hal check` does not start.
     std::string path_of_file(const hal::Texts& texts) const {

@@ -16,8 +16,8 @@ extern "C" {
 
 typedef struct hal_unstarted {
     uint32_t size;
-    /* Returns the first argument behind the options of the last program of this name; NULL when
-       there is none. The text stays until the instance is created. [setup] */
+    /* Returns the first argument behind the options of the last program of this name; NULL
+       without such an argument. The text stays until the instance is created. [setup] */
     const char *(*argument)(const hal_host *, const char *program);
 } hal_unstarted;
 

@@ -183,7 +183,7 @@ bool add_threads(Construction& c) {
     return true;
 }
 
-/// Returns the first pin with the name of one before it; nullptr: there is none.
+/// Returns the first pin with the name of one before it; nullptr without one.
 const Pin* declared_twice(const Instance& instance) {
     std::vector<std::string_view> names;
     names.reserve(instance.pins.size());

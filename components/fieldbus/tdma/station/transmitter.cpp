@@ -146,8 +146,8 @@ bool Transmitter::calibrates(const Slot& slot, std::uint32_t cycle, Time local_a
     return true;
 }
 
-/// Takes the next frame of a slot. Returns false when there is none, when it needs more than `space`
-/// bytes on the line, or while another thread has the queues.
+/// Takes the next frame of a slot. Returns false when the slot is empty, when the frame needs more
+/// than `space` bytes on the line, and while another thread has the queues.
 bool Transmitter::take(Slot& slot, std::size_t space) noexcept {
     const link::OrderedCall call(core_.order, link::OrderedCall::Wait::bounded);
     if (!call.is_made() || core_.has_stale_frames) return false;
