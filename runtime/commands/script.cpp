@@ -585,10 +585,12 @@ void Script::report_end(const Command& command) {
 }
 
 bool Script::interrupted(Context& context) {
-    if (!state_.cancelled.load(std::memory_order_relaxed) && !session_.ending()) return false;
+    const bool ends = session_.ending();
+    if (!state_.cancelled.load(std::memory_order_relaxed) && !ends) return false;
     if (!context.diagnostics.failed()) {
+        const std::string text = "'" + context.command.name.text + "' was interrupted";
         context.diagnostics.error("interrupted", context.command.span,
-                                  "'" + context.command.name.text + "' was interrupted");
+                                  ends ? text + ": the machine ends" : text);
     }
     return true;
 }

@@ -209,7 +209,7 @@ class Case(unittest.TestCase):
             text=True,
             **how,
         )
-        self.addCleanup(self.end, machine)
+        self.addCleanup(self.end_quietly, machine)
         if loaded:
 
             def ready():
@@ -235,6 +235,13 @@ class Case(unittest.TestCase):
             raise AssertionError("the machine does not end") from None
         except ValueError:
             return "", ""  # asked for already
+
+    def end_quietly(self, machine):
+        """As end(); what a machine said that had ended by itself is shown, when no test asked."""
+        by_itself = machine.poll() is not None
+        out, err = self.end(machine)
+        if by_itself and (out or err):
+            print(f"{machine.args}: ended with {machine.returncode}: {out}{err}", file=sys.stderr)
 
     def shell(self, *words, instance="default"):
         return self.run_program("shell", "--name", instance, *words)

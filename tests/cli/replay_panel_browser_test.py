@@ -7,7 +7,7 @@ import re
 import sys
 import unittest
 
-from harness import SANITIZED, Case
+from harness import SANITIZED, Case, wait_until
 from past_panel import Client, journal_incident, start_past
 from web import PANEL, Browser, have_browser
 
@@ -81,14 +81,19 @@ class TimeLine(Case):
         )
 
     def compare_watch(self):
-        read = "document.querySelector('[data-value=\"{}\"]').textContent.trim()"
+        """Waits until the watch view, which is drawn after the move, shows the shell's values."""
         for name, value in zip(NAMES, self.shell_values(NAMES)):
-            self.browser.wait(f"{read.format(name)} !== '–'")
-            shown = self.browser.evaluate(read.format(name))
-            if value in ("TRUE", "FALSE"):
-                self.assertEqual(value, shown)
-            else:
-                self.assertEqual(float(value), float(shown), name)
+            read = f"document.querySelector('[data-value=\"{name}\"]').textContent.trim()"
+            wait_until(
+                lambda: self.same(value, self.browser.evaluate(read)), f"{name} is shown as {value}"
+            )
+
+    @staticmethod
+    def same(value, shown):
+        """Compares numbers, as the page leaves out zeros that the shell prints."""
+        if value in ("TRUE", "FALSE") or shown in ("", "–"):
+            return value == shown
+        return float(value) == float(shown)
 
     def test_dragging_shows_the_values_of_that_moment(self):
         self.begin("watch?names=" + ",".join(NAMES))
@@ -104,10 +109,9 @@ class TimeLine(Case):
             )
             moment = self.moment()
             self.compare_watch()
-            position = self.browser.evaluate("document.querySelector('.thumb').style.left")
-            self.assertAlmostEqual(
-                100 * moment["time_ns"] / end_ns, float(position.rstrip("%")), delta=0.01
-            )
+            percent = 100 * moment["time_ns"] / end_ns
+            position = "parseFloat(document.querySelector('.thumb').style.left)"
+            self.browser.wait(f"Math.abs({position} - {percent}) < 0.01")
         self.assertEqual(
             ["none"],
             self.browser.evaluate(
