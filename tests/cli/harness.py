@@ -237,11 +237,11 @@ class Case(unittest.TestCase):
             return "", ""  # asked for already
 
     def end_quietly(self, machine):
-        """As end(); what a machine said that had ended by itself is shown, when no test asked."""
-        by_itself = machine.poll() is not None
-        out, err = self.end(machine)
-        if by_itself and (out or err):
-            print(f"{machine.args}: ended with {machine.returncode}: {out}{err}", file=sys.stderr)
+        """As end(); the errors of a machine that had ended before are shown, when no test asked."""
+        has_ended = machine.poll() is not None
+        _, err = self.end(machine)
+        if has_ended and err:
+            print(f"{machine.args}: ended with {machine.returncode}: {err}", file=sys.stderr)
 
     def shell(self, *words, instance="default"):
         return self.run_program("shell", "--name", instance, *words)

@@ -140,9 +140,10 @@ private:
             text += execution_.reason() + "\n";
         } else if (execution_.state() == ReExecution::State::ends) {
             good = !file_.complete() && !has_gap();
-            text += "the journal ends: " + execution_.reason() + "\n";
+            text += "the journal ends: " + execution_.reason();
+            text += machine_.change().done() ? "\n" : "; " + verdict("no difference before") + "\n";
         } else if (!machine_.change().done()) {
-            text += verdict(stopped);
+            text += verdict(stopped ? "stopped; no difference so far" : "no difference") + "\n";
         }
         text += machine_.consequences();
         if (!machine_.change().empty() && !machine_.change().done() && !differs) {
@@ -199,11 +200,11 @@ private:
                                    [](const auto& entry) { return !entry.second.gap().empty(); });
     }
 
-    std::string verdict(bool stopped) const {
-        const std::string where = stopped ? "stopped; no difference so far" : "no difference";
+    /// The text and, where a recording was compared, how many values.
+    std::string verdict(std::string text) const {
         const auto compared = machine_.compared();
-        if (!compared) return where + "\n";
-        return fmt::format("{}, {} compared\n", where, counted(*compared, "value"));
+        if (!compared) return text;
+        return fmt::format("{}, {} compared", text, counted(*compared, "value"));
     }
 
     /// Prints the values of --show. Returns false after a note when the machine has no such name.
