@@ -237,7 +237,7 @@ class Case(unittest.TestCase):
             return "", ""  # asked for already
 
     def end_quietly(self, machine):
-        """As end(); the errors of a machine that had ended before are shown, when no test asked."""
+        """As end(); prints the errors of a machine that had ended before, when no test asked."""
         has_ended = machine.poll() is not None
         _, err = self.end(machine)
         if has_ended and err:
