@@ -4,7 +4,7 @@
 #
 # canopen reads a decimal number (1.5). The bits in hexadecimal (0x3FC00000) give no default value, without a message. dcf-tools, which
 # writes the configuration of lely-core's and ros2_canopen's masters, reads only the bits; the decimal number raises ValueError.
-# Consequence: whoever corrects an EDS so that dcfgen accepts it takes the defaults of its gains and limits away from Python programs.
+# Consequence: an EDS that is corrected so that dcfgen accepts it has no defaults of its gains and limits in Python programs.
 set -eu
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
