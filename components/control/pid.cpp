@@ -3,6 +3,7 @@
 #include <numbers>
 
 #include "hal/component.hpp"
+#include "hal/interruption.hpp"
 #include "hal/limit.hpp"
 #include "hal/retained.hpp"
 
@@ -136,9 +137,12 @@ public:
         const double dt = cycle.seconds();
         const bool at_index = was_index_enable_ & !index_enable;
         was_index_enable_ = index_enable;
+        if (interruption_.accept()) {
+            forget_previous();
+        }
 
-        // The first cycle has no previous target, and at the index the previous one is in the old
-        // coordinates.
+        // The first cycle, also after a stop, has no previous target, and at the index the previous
+        // one is in the old coordinates.
         const bool use_previous = error_previous_target & has_previous_ & !at_index;
         const double deviation = (use_previous ? last_command_ : command.get()) - feedback;
         error = deviation;
@@ -174,6 +178,12 @@ private:
         if (e > band) return e - band;
         if (e < -band) return e + band;
         return e * 0.0;  // 0, or NaN
+    }
+
+    void forget_previous() {
+        has_previous_ = false;
+        slope_ = feedback_d_ = error_d_ = 0.0;
+        command_d_ = command_dd_ = command_ddd_ = 0.0;
     }
 
     /// Estimates all derivatives, also while disabled, so that enabling causes no spike. The slope
@@ -356,8 +366,10 @@ private:
     const hal_faults* const faults_ = hal::extension<hal_faults>("hal.faults/1");
     double ultimate_gain_ = 0.0;
     double ultimate_period_ = 0.0;
+    hal::Interruption interruption_{*this};
     hal::Retained retained_{*this,
                             {{"integral", integral_},
+                             {"interruption", interruption_},
                              {"pushing", pushing_},
                              {"last-command", last_command_},
                              {"last-feedback", last_feedback_},
@@ -407,10 +419,10 @@ In the cycle of the falling edge of `index-enable`, a slope computed as a differ
 value. While an input is NaN, `output` is 0 and the integral and the derivatives keep their values.
 While a limit is NaN, its last valid value applies, and a fault is raised.
 
-**Differences from LinuxCNC:** the output is bit-identical except in these cases. In the first cycle
-the slopes are 0 and the error is that of the current command (LinuxCNC starts from 0, which kicks
-FF1 and Dgain). Setting `maxoutput` to 0 ends the saturation (LinuxCNC: `saturated` and the held
-integral remain). A negative limit or deadband counts as positive (LinuxCNC: the output jumps
+**Differences from LinuxCNC:** the output is bit-identical except in these cases. In the first cycle,
+also after a stop of the thread, the slopes are 0 and the error is that of the current command
+(LinuxCNC starts from 0, or from before the stop, which kicks FF1 and Dgain). Setting `maxoutput` to
+0 ends the saturation (LinuxCNC: `saturated` and the held integral remain). A negative limit or deadband counts as positive (LinuxCNC: the output jumps
 between its limits). While an input is NaN the output is 0 (LinuxCNC: NaN). While a limit is NaN its
 last valid value applies (LinuxCNC: no limit). Auto-tuning ignores the first two half cycles, before
 the oscillation is stable (LinuxCNC averages them in), and leaves the gains as they are, with a

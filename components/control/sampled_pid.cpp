@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "hal/component.hpp"
+#include "hal/interruption.hpp"
 #include "hal/limit.hpp"
 #include "hal/retained.hpp"
 
@@ -87,6 +88,10 @@ private:
         const double td = std::fmax(derivative_time, 0.0);
 
         const double n = std::fmax(filter, 1e-9);
+        if (interruption_.accept()) {
+            started_ = false;
+            derivative_ = 0.0;
+        }
         if (!started_) {
             before_ = feedback;
             started_ = true;
@@ -120,6 +125,7 @@ private:
     double before_ = 0.0;
     double next_ = 0.0;
     bool started_ = false;
+    hal::Interruption interruption_{*this};
     hal::Retained retained_{*this,
                             {{"queue", queue_},
                              {"first", first_},
@@ -128,7 +134,8 @@ private:
                              {"derivative", derivative_},
                              {"before", before_},
                              {"next", next_},
-                             {"started", started_}}};
+                             {"started", started_},
+                             {"interruption", interruption_}}};
 };
 
 }  // namespace

@@ -2,6 +2,7 @@
 #include <limits>
 
 #include "hal/component.hpp"
+#include "hal/interruption.hpp"
 #include "hal/limit.hpp"
 #include "hal/retained.hpp"
 
@@ -29,8 +30,10 @@ struct Spindle : hal::Component {
     hal::Out<double> output{
         *this, "output", "command for the drive: (speed + offset) * scale", {.safe = 0.0}};
     hal::Out<std::uint32_t> current_gear{*this, "current-gear", "number of the gear in use"};
-    hal::Out<bool> at_speed{*this, "at-speed",
-                            "TRUE while the speed is within speed-tolerance of commanded-speed"};
+    hal::Out<bool> at_speed{*this,
+                            "at-speed",
+                            "TRUE while the speed is within speed-tolerance of commanded-speed",
+                            {.safe = false}};
     hal::Out<bool> forward{*this, "forward", "TRUE: the drive turns forward", {.safe = false}};
     hal::Out<bool> reverse{*this, "reverse", "TRUE: the drive turns backward", {.safe = false}};
     hal::Out<bool> brake{*this, "brake", "TRUE while the spindle must decelerate"};
@@ -78,6 +81,9 @@ struct Spindle : hal::Component {
     hal::Function run{*this, "", &Spindle::update, "computes the drive's speed and direction"};
 
     void update(hal::Cycle cycle) noexcept {
+        if (interruption_.accept()) {
+            start_from_rest();
+        }
         const std::size_t gear = chosen_gear();
         current_gear = static_cast<std::uint32_t>(gear);
         const bool simulated = simulate_encoder;
@@ -113,6 +119,13 @@ struct Spindle : hal::Component {
     }
 
 private:
+    /// The drive had no command meanwhile: its ramp begins at 0. An encoder measures what remains.
+    /// [realtime]
+    void start_from_rest() noexcept {
+        rpm = 0.0;
+        commanded_ = 0.0;
+    }
+
     /// Returns the speed that the encoder measures, in rpm; 0 while it is not a finite number.
     /// [realtime]
     double measured_speed() const noexcept {
@@ -169,7 +182,8 @@ private:
     }
 
     double commanded_ = 0.0;  // magnitude of the last command to the drive, in rpm
-    hal::Retained retained_{*this, {{"commanded", commanded_}}};
+    hal::Interruption interruption_{*this};
+    hal::Retained retained_{*this, {{"commanded", commanded_}, {"interruption", interruption_}}};
 };
 
 }  // namespace
@@ -191,7 +205,8 @@ more time. While `at-speed` is TRUE and the target is within `speed-tolerance`, 
 
 Whatever the encoder measures, the commanded speed is at most `max`; above a lowered `max` it falls
 by `decel` per second, with an encoder by at least `decel` per cycle. On the way to 0 it does not
-rise, and while `forward` and `reverse` are FALSE it is 0. An `output` that is not a finite number,
+rise, and while `forward` and `reverse` are FALSE it is 0. After a stop of the thread a simulated
+speed begins at 0. An `output` that is not a finite number,
 because of `scale` or `offset`, is 0.
 
 `brake` is TRUE while the spindle turns (above `zero-tolerance`) too fast or in the wrong direction. `numgears=N` gives N gears with a pin of
@@ -206,8 +221,8 @@ outputs remain NaN), and an `output` that would be NaN or infinite is 0. Only a 
 drive turns has an `output` on the way to 0, it does not rise with the measured speed, and nothing
 measured raises it above `max` (LinuxCNC: the measured speed minus `decel` is sent). A change of
 `min`, `max` or the gear at speed follows `accel` and `decel` (LinuxCNC: it jumps). While the
-machine is stopped, `output` is 0, and `forward` and `reverse` are FALSE (LinuxCNC: they keep their
-values).
+machine is stopped, `output` is 0, and `forward`, `reverse` and `at-speed` are FALSE (LinuxCNC: they
+keep their values).
 
     loadrt spindle names=router
     addf router servo

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "hal/component.hpp"
+#include "hal/interruption.hpp"
 #include "hal/limit.hpp"
 #include "hal/retained.hpp"
 
@@ -81,6 +82,10 @@ struct ForceControl : hal::Component {
             return;
         }
         error = e;
+        if (interruption_.accept()) {
+            started_ = false;
+            speed_ = 0.0;
+        }
         const double path_speed = started_ ? (path - path_) / dt : 0.0;
 
         const double rate = started_ ? (e - error_) / dt : 0.0;
@@ -215,6 +220,7 @@ private:
     double error_ = 0.0;
     std::uint32_t mode_ = 0;
     bool started_ = false;
+    hal::Interruption interruption_{*this};
     hal::Retained retained_{*this,
                             {{"integral", integral_},
                              {"offset", offset_},
@@ -222,7 +228,8 @@ private:
                              {"path", path_},
                              {"error", error_},
                              {"mode", mode_},
-                             {"started", started_}}};
+                             {"started", started_},
+                             {"interruption", interruption_}}};
 };
 
 }  // namespace

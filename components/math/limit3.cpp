@@ -16,6 +16,7 @@
 #include <utility>
 
 #include "hal/component.hpp"
+#include "hal/interruption.hpp"
 #include "hal/limit.hpp"
 #include "hal/retained.hpp"
 
@@ -133,6 +134,9 @@ struct Limit3 : hal::Component {
         const double a = std::min(maxa * period * period, max_magnitude),
                      v = maxv > 0.0 ? std::min(maxv * period, max_magnitude) : 0.0;
         const double speed = look_at_input();
+        if (interruption_.accept()) {
+            stand();
+        }
         if (load) {
             carry(a, std::clamp(speed, -v, v));
         } else if (a > 1.0 / max_magnitude) {
@@ -285,6 +289,7 @@ private:
     double high_ = 0.0;
     double low_now_ = 0.0;  // max; the lower of min and max
     bool arrived_ = true;  // out is on its goal
+    hal::Interruption interruption_{*this};
     hal::Retained retained_{*this,
                             {{"position", position_},
                              {"rest", rest_},
@@ -293,7 +298,8 @@ private:
                              {"speed-in", speed_in_},
                              {"high", high_},
                              {"low-now", low_now_},
-                             {"arrived", arrived_}}};
+                             {"arrived", arrived_},
+                             {"interruption", interruption_}}};
 };
 
 }  // namespace
@@ -308,8 +314,9 @@ full `maxa` or the full `maxv` until a few cycles before a stop. With `smooth-st
 acceleration fades out over that many cycles: this takes slightly longer and is smoother with a
 jittering input.
 
-`out` starts at 0; `load` sets it to the input, or to 0 while `enable` is FALSE. While the input or
-a limit is NaN its last valid value applies; for a limit a fault is raised. If `maxa` is not
+`out` starts at 0, and after a stop of the thread from rest; `load` sets it to the input, or to 0
+while `enable` is FALSE. While the input or a limit is NaN its last valid value applies; for a limit
+a fault is raised. If `maxa` is not
 positive, `out` does not move. If `min` is above `max`, `max` applies.
 
 **Differences from LinuxCNC:** acceleration and cruising are the same. Halcyon's `limit3` stops with

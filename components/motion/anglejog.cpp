@@ -6,6 +6,7 @@
 
 #include "hal/component.hpp"
 #include "hal/edge.hpp"
+#include "hal/interruption.hpp"
 #include "hal/limit.hpp"
 #include "hal/retained.hpp"
 
@@ -38,7 +39,8 @@ struct Anglejog : hal::Component {
     hal::Out<double> current_angle{
         *this, "current-angle-degrees", "direction in use", {.unit = "deg"}};
     hal::Out<double> current_magnitude{*this, "current-mag", "distance along the direction"};
-    hal::Out<double> current_velocity{*this, "current-vel", "speed along the direction, signed"};
+    hal::Out<double> current_velocity{
+        *this, "current-vel", "speed along the direction, signed", {.safe = 0.0}};
     hal::Function run{*this, "", &Anglejog::update, "computes the counts of both axes"};
 
     void update(hal::Cycle cycle) noexcept {
@@ -64,6 +66,9 @@ struct Anglejog : hal::Component {
             adopt();
         }
 
+        if (interruption_.accept()) {
+            velocity_ = 0.0;
+        }
         const double distance = static_cast<double>(commanded_counts_) * unit_ - magnitude_;
         active = move(enabled && !waiting_ ? distance : 0.0, cycle.seconds());
         enable_out = enabled;
@@ -146,8 +151,10 @@ private:
     std::int32_t factor_ = 10000;
     std::int64_t last_counts_ = 0;
     std::int64_t commanded_counts_ = 0;
+    hal::Interruption interruption_{*this};
     hal::Retained retained_{*this,
                             {{"started", started_},
+                             {"interruption", interruption_},
                              {"was-enabled", enable_edge_},
                              {"waiting", waiting_},
                              {"angle", angle_},

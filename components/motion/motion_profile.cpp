@@ -7,6 +7,7 @@
 
 #include "hal/component.hpp"
 #include "hal/edge.hpp"
+#include "hal/interruption.hpp"
 #include "hal/retained.hpp"
 #include "profile.hpp"
 
@@ -112,12 +113,14 @@ struct MotionProfile : hal::Component {
     hal::Out<double> position{*this, "position", "position of the profile", {.finite = true}};
     hal::Out<double> velocity{
         *this, "velocity", "velocity of the profile", {.unit = "1/s", .safe = 0.0, .finite = true}};
-    hal::Out<double> acceleration{
-        *this, "acceleration", "acceleration of the profile", {.unit = "1/s^2", .finite = true}};
+    hal::Out<double> acceleration{*this,
+                                  "acceleration",
+                                  "acceleration of the profile",
+                                  {.unit = "1/s^2", .safe = 0.0, .finite = true}};
     hal::Out<double> jerk{*this,
                           "jerk",
                           "jerk of the profile; 0 in trapezoidal profiles",
-                          {.unit = "1/s^3", .finite = true}};
+                          {.unit = "1/s^3", .safe = 0.0, .finite = true}};
     hal::Out<bool> done{*this, "done", "TRUE: target (mode 3: speed) reached and queue empty"};
     hal::Out<bool> moving{*this, "moving", "TRUE while the speed or the acceleration is not 0"};
     hal::Out<bool> acknowledge{*this, "set-point-acknowledge",
@@ -145,6 +148,9 @@ struct MotionProfile : hal::Component {
             forget();
         }
         last_mode_ = mode;
+        if (interruption_.accept()) {
+            generator_.put(generator_.state().position);
+        }
 
         const bool stopping = stop_in || quick_stop;
         if (load) {
@@ -379,8 +385,10 @@ private:
     bool in_table_ = false;
     bool start_table_ = false;
     hal::RisingEdge run_edge_;
+    hal::Interruption interruption_{*this};
     hal::Retained retained_{*this,
                             {{"generator", generator_},
+                             {"interruption", interruption_},
                              {"limits", limits_},
                              {"goal", goal_},
                              {"side", side_},
@@ -436,7 +444,8 @@ microseconds; the cost of other cycles is negligible.
 
 `halt` brakes and keeps the set-points; `stop` and `quick-stop` brake and discard the set-point, the
 queue and the table, as does a change of mode. In modes 0 and 3 the motion resumes when they end.
-`load` sets the position, with velocity 0 at once (to the feedback, while the drive is off).
+`load` sets the position, with velocity 0 at once (to the feedback, while the drive is off). After a
+stop of the thread the motion goes on from rest.
 
 While `target` is NaN its last valid value applies (in mode 1 the set-point is rejected). A limit
 that is negative or NaN, or 0 for speed or acceleration, sets `limit-error`, and the motion stops

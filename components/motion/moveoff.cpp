@@ -5,6 +5,7 @@
 
 #include "axis_planner.hpp"
 #include "hal/component.hpp"
+#include "hal/interruption.hpp"
 #include "hal/limit.hpp"
 #include "hal/retained.hpp"
 
@@ -81,6 +82,9 @@ struct Moveoff : hal::Component {
     void read_inputs(hal::Cycle cycle) noexcept {
         const double dt = cycle.seconds();
         const bool wanted = move_enable && apply_offsets;
+        if (interruption_.accept()) {
+            stop_at_once();
+        }
         if (!power_on) return pause();
         paused_ = false;
 
@@ -117,10 +121,14 @@ private:
     static constexpr std::size_t max_waypoints = 1000;
     enum : std::int32_t { idle = 0, follows = 1, returns = 2, off = 3 };
 
-    void pause() noexcept {
+    void stop_at_once() noexcept {
         for (auto& axis : axes_) {
             axis.stop_at_once();
         }
+    }
+
+    void pause() noexcept {
+        stop_at_once();
         paused_ = true;
         publish();
     }
@@ -211,8 +219,10 @@ private:
     double near_ = 0.0005;
     double step_ = 0.02;
     double every_ = 0.02;
+    hal::Interruption interruption_{*this};
     hal::Retained retained_{*this,
                             {{"axes", axes_},
+                             {"interruption", interruption_},
                              {"applied", applied_},
                              {"last", last_},
                              {"waypoints", waypoints_},

@@ -14,7 +14,7 @@ struct SimpleTp : hal::Component {
     hal::Limit max_acceleration{*this, "maxaccel", "maximum acceleration"};
     hal::In<bool> enable{*this, "enable", "FALSE brakes to a stop"};
     hal::Out<double> position{*this, "current-pos", "current position"};
-    hal::Out<double> velocity{*this, "current-vel", "current velocity"};
+    hal::Out<double> velocity{*this, "current-vel", "current velocity", {.safe = 0.0}};
     hal::Out<bool> active{*this, "active", "TRUE until the target is reached"};
     hal::Function run{*this, "update", &SimpleTp::update, "computes the next position"};
 
@@ -55,7 +55,7 @@ HAL_COMPONENT(SimpleTp, "simple_tp",
               "Trajectory planner for one axis: trapezoidal speed to a target", R"(
 Moves `current-pos` to `target-pos` with at most `maxvel` and `maxaccel`, and stops there without overshoot. The target and the limits
 may change at any time: the axis reverses or decelerates within `maxaccel`. While `enable` is FALSE, or the target is NaN or
-beyond 1e20, it brakes with `maxaccel` and stops. The initial position is 0. It stops within a thousandth of the distance of the first cycle of
+beyond 1e20, it brakes with `maxaccel` and stops. After a stop of the thread it starts from rest. The initial position is 0. It stops within a thousandth of the distance of the first cycle of
 an acceleration, `maxaccel` * T * T for a thread of period T.
 
 **Differences from LinuxCNC:** A `maxvel` or `maxaccel` that is negative counts as 0: no motion, no change of the speed. For NaN its last valid value applies (LinuxCNC:

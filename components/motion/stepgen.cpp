@@ -10,6 +10,7 @@
 #include "hal/component.hpp"
 #include "hal/corrected.hpp"
 #include "hal/function_monitor.hpp"
+#include "hal/interruption.hpp"
 #include "hal/lasting_fault.hpp"
 #include "hal/limit.hpp"
 #include "hal/queue.hpp"
@@ -185,6 +186,9 @@ struct Stepgen : hal::Component {
             wanted.rate = 0.0;
             wanted.slope = 0.0;
         }
+        if (pulses_interrupted_.accept()) {
+            rate_ = 0.0;
+        }
         const double before = rate_;
         const double change = wanted.slope * cycle.seconds();
         rate_ =
@@ -219,7 +223,8 @@ struct Stepgen : hal::Component {
     /// make-pulses together with the timing of the pulses. While disabled the rate is 0.
     void update_freq(hal::Cycle cycle) noexcept {
         updates_.ran(cycle.period_ns());
-        if (was_abandoned_.exchange(false, std::memory_order_relaxed)) {
+        const bool was_abandoned = was_abandoned_.exchange(false, std::memory_order_relaxed);
+        if (updates_interrupted_.accept() || was_abandoned) {
             frequency = 0.0;
             if (position_cmd) {
                 last_command_ = *position_cmd * scale();
@@ -450,8 +455,12 @@ private:
     std::int64_t setup_ns_ = 0;
     // update-freq only
     double last_command_ = 0.0;
+    hal::Interruption pulses_interrupted_{*this};  // accepted by make-pulses
+    hal::Interruption updates_interrupted_{*this};  // accepted by update-freq
     hal::Retained retained_{*this,
                             {{"updates", updates_},
+                             {"pulses-interrupted", pulses_interrupted_},
+                             {"updates-interrupted", updates_interrupted_},
                              {"was-abandoned", was_abandoned_},
                              {"orders", orders_},
                              {"tick-ns", tick_ns_},
@@ -505,7 +514,7 @@ one period. A negative `maxvel` or `maxaccel` is set to 0; one that is above wha
 permits (for `maxaccel`: from 0 to the highest speed in one update) is set to that. With `stepspace`
 0 a pulse may occur in every period, for ports that reset the pulse themselves. When `update-freq`,
 which reads `enable`, has not run for 100 of its periods, the motor stops, and a fault names the
-missing function.
+missing function. After a stop of the threads the rate begins at 0 and rises within `maxaccel`.
 
 **Differences from LinuxCNC:** steps occur in different periods. A command with constant speed is
 followed with a lag of one update (LinuxCNC: two and a half), and braking starts as late as

@@ -574,7 +574,8 @@ bool Core::catch_up() {
     record.writes_before = pushed_;
     record.writes_after = pushed_;
     record.observation = asked ? asked->number : 0;
-    inputs_->load(record, {});
+    const std::uint64_t live = safe_ ? 0 : 1;  // an edit at rest stops no functions
+    inputs_->load(record, {&live, 1});
     service();
     return plan_ != before || applied_.load() != applied || observation_.load() != asked;
 }
