@@ -4,6 +4,7 @@
 
 #include "hal/component.hpp"
 #include "hal/edge.hpp"
+#include "hal/interruption.hpp"
 #include "hal/retained.hpp"
 
 namespace {
@@ -101,6 +102,9 @@ struct Carousel : hal::Component {
     void update(hal::Cycle cycle) noexcept {
         if (unhome) {
             homed = false;
+        }
+        if (interruption_.accept() && state_ != State::rests) {
+            abandon();
         }
         look();
         const bool stops = state_ != State::homing && state_ != State::jogging;
@@ -291,6 +295,14 @@ private:
 
     // ---- what it does
 
+    /// The motor was switched off during a move, and pulses meanwhile were not counted.
+    void abandon() noexcept {
+        enter(State::rests);
+        if (!absolute() && encoding != Encoding::counts) {
+            homed = false;
+        }
+    }
+
     void begin() noexcept {
         ready = false;
         if (knows_position()) return set_out();
@@ -437,8 +449,10 @@ private:
     std::int64_t zero_ = 0;
     double left_ = 0.0;
     double last_pocket_ = 0.0;
+    hal::Interruption interruption_{*this};
     hal::Retained retained_{*this,
                             {{"state", state_},
+                             {"interruption", interruption_},
                              {"was-enabled", enable_edge_},
                              {"was-jog-fwd", forward_edge_},
                              {"was-jog-rev", reverse_edge_},
@@ -475,6 +489,9 @@ numbered from 1.
 The last three must first find pocket 1: the first `enable` turns forward until the index, even if
 `enable` becomes FALSE meanwhile. With `index` and `edge`, each pass of the index corrects the
 count. With `counts`, a pocket is reached within `width` of its centre.
+
+A stop of the thread ends a move: it needs another rising edge of `enable`, and with `index` and
+`edge` pocket 1 must be found again.
 
 With `align-dc` the carousel stops at the marker for `decel-time`, moves back slowly past the
 marker, and forward onto it. With `rev-pulse` it is then driven in reverse against its lock for that

@@ -149,6 +149,7 @@ struct MotionProfile : hal::Component {
         }
         last_mode_ = mode;
         if (interruption_.accept()) {
+            forget();
             generator_.put(generator_.state().position);
         }
 
@@ -445,7 +446,8 @@ microseconds; the cost of other cycles is negligible.
 `halt` brakes and keeps the set-points; `stop` and `quick-stop` brake and discard the set-point, the
 queue and the table, as does a change of mode. In modes 0 and 3 the motion resumes when they end.
 `load` sets the position, with velocity 0 at once (to the feedback, while the drive is off). After a
-stop of the thread the motion goes on from rest.
+stop of the thread the position is at rest, and all set-points and the table are discarded; modes 0
+and 3 follow their inputs again.
 
 While `target` is NaN its last valid value applies (in mode 1 the set-point is rejected). A limit
 that is negative or NaN, or 0 for speed or acceleration, sets `limit-error`, and the motion stops

@@ -575,6 +575,7 @@ bool Core::catch_up() {
     record.writes_after = pushed_;
     record.observation = asked ? asked->number : 0;
     const std::uint64_t live = safe_ ? 0 : 1;  // an edit at rest stops no functions
+    record.notes = 1;
     inputs_->load(record, {&live, 1});
     service();
     return plan_ != before || applied_.load() != applied || observation_.load() != asked;

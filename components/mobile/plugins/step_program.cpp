@@ -2,6 +2,7 @@
 #include <deque>
 
 #include "hal/component.hpp"
+#include "hal/interruption.hpp"
 #include "hal/retained.hpp"
 #include "hal/texts.hpp"
 #include "mobile/texts/step_text.hpp"
@@ -39,7 +40,13 @@ public:
     }
 
     void update(hal::Cycle cycle) noexcept {
+        if (interruption_.accept() && at_ != 0) {
+            waits_for_reset_ = true;
+        }
         if (reset || !enable) {
+            waits_for_reset_ = false;
+        }
+        if (reset || !enable || waits_for_reset_) {
             enter(0, cycle);
             started_ = false;
             fired_ = 0;
@@ -53,7 +60,8 @@ public:
         time = started_ ? seconds(cycle.start_ns() - left_ns_) : 0.0;
         step = at_;
         for (std::size_t i = 0; i < outputs_.size(); ++i) {
-            outputs_[i] = enable && (program_.steps[at_].outputs >> i & 1) != 0;
+            outputs_[i] =
+                enable && !waits_for_reset_ && (program_.steps[at_].outputs >> i & 1) != 0;
         }
         for (std::size_t i = 0; i < active_.size(); ++i) {
             active_[i] = i == at_;
@@ -107,6 +115,7 @@ private:
     std::uint32_t at_ = 0;
     bool begun_ = false;
     bool started_ = false;
+    bool waits_for_reset_ = false;
 
 public:
     hal::In<bool> enable{*this,
@@ -121,13 +130,16 @@ public:
     hal::Out<double> step_time{*this, "step-time", "time since the step began", {.unit = "s"}};
     hal::Function run{*this, "update", &StepProgram::update,
                       "takes at most one transition and sets the outputs"};
+    hal::Interruption interruption_{*this};
     hal::Retained retained_{*this,
                             {{"entered-ns", entered_ns_},
                              {"left-ns", left_ns_},
                              {"fired", fired_},
                              {"at", at_},
                              {"begun", begun_},
-                             {"started", started_}}};
+                             {"started", started_},
+                             {"waits-for-reset", waits_for_reset_},
+                             {"interruption", interruption_}}};
 };
 
 }  // namespace
@@ -153,6 +165,9 @@ A sequence in a text file, in the manner of a sequential function chart (IEC 611
 At most one transition is taken per cycle. A pin `in-STEP` for each step is TRUE in that step. At
 most 64 inputs, 64 outputs, 128 steps and 32 transitions per step. Names have a to z, 0 to 9 and
 `-`.
+
+After a stop of the thread in any other step the program is in its first step, with all outputs
+FALSE, until `reset` is TRUE or `enable` is FALSE for a cycle.
 
     loadrt step_program file=match.program names=match
     addf match.update servo
