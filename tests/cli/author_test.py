@@ -53,6 +53,14 @@ REJECTED = {
         IN.replace('"the input"', '"the input", {.safe = 1.0}') + OUT + RUN + STEP,
         "mine.cpp:6: pin 'in' is an input and has .safe, which applies to outputs only: the value they take when the machine stops",
     ),
+    "a safe value that is no number": (
+        IN + OUT.replace('"the output"', '"the output", {.safe = std::nan("")}') + RUN + STEP,
+        "mine.cpp:7: component 'mine' cannot make 'mine.0': pin 'out' has the safe value nan; it must be a finite number",
+    ),
+    "an infinite safe value": (
+        IN + OUT.replace('"the output"', '"the output", {.safe = -HUGE_VAL}') + RUN + STEP,
+        "mine.cpp:7: component 'mine' cannot make 'mine.0': pin 'out' has the safe value -inf; it must be a finite number",
+    ),
     "a finite bool": (
         IN + OUT + '    hal::Out<bool> on{*this, "on", "always", {.finite = true}};\n' + RUN + STEP,
         "mine.cpp:8: pin 'on' has .finite, which applies to pins of type double only",

@@ -3,7 +3,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstring>
+
+#include "base/types.hpp"
 
 namespace hal {
 namespace {
@@ -51,6 +54,12 @@ bool take_pin(const hal_host* host, const hal_pin_decl* decl, hal_pin* memory) {
     if (!good_name(decl->name)) {
         return refuse(c, "it declares a pin with the invalid name '" + std::string(decl->name) +
                              "': letters, digits and - _ . : are valid");
+    }
+    const bool has_real_safe = (decl->flags & HAL_PIN_SAFE) && decl->type == HAL_TYPE_FLOAT;
+    if (has_real_safe && !std::isfinite(decl->safe.real)) {
+        return refuse(c, "pin '" + std::string(decl->name) + "' has the safe value " +
+                             format_value(HAL_TYPE_FLOAT, decl->safe) +
+                             "; it must be a finite number");
     }
     auto pin = std::make_unique<Pin>();
     const bool whole = c.whole_pin_names || whole_names(c.instance);
