@@ -38,7 +38,7 @@ constexpr Driver drivers[] = {
     {link::form_of(address_forms, "cane"), cane::open, cane::describe, cane::is_own_option,
      cane::own_options, "bitrate datarate own errors restart", Journal::carrier},
     {link::form_of(address_forms, "scocan"), scocan::open, scocan::describe, scocan::is_own_option,
-     scocan::own_options, "bitrate datarate fd own errors stamps restart", Journal::carrier},
+     scocan::own_options, "bitrate datarate fd own errors stamps restart", Journal::order},
     {link::form_of(address_forms, "replay"), replay::open, replay::describe, nullptr, nullptr,
      "own restart sendqueue receivequeue"},
 };

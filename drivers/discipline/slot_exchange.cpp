@@ -46,7 +46,7 @@ std::shared_ptr<SlotExchange> offer_slots(const std::string& node, const Descrip
     const std::lock_guard lock(all.mutex);
     auto& exchange = all.nodes[node];
     if (!exchange) {
-        exchange = std::make_shared<SlotExchange>();
+        exchange = std::make_shared<SlotExchange>(node);
     }
     if (exchange->offered.exchange(true)) return nullptr;
     exchange->description = description;

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "hal/queue.hpp"
+#include "link/call_order.hpp"
 #include "link/can.hpp"
 
 namespace hal::can {
@@ -38,9 +39,14 @@ struct SlotUser {
     std::atomic<std::uint64_t> rejected{0};
 };
 
+/// Under a journal, all threads take turns with `order` at the users and at `state`: those of the links
+/// by their calls (drivers/can/journal), that of the node by an OrderedCall.
 class SlotExchange {
 public:
     static constexpr std::size_t max_users = 16;
+
+    explicit SlotExchange(const std::string& node)
+        : order(link::CallOrder::of("can", "scocan:" + node)) {}
 
     /// Returns false when there are too many. [setup]
     bool add(SlotUser&);
@@ -61,8 +67,8 @@ public:
     std::atomic<bool> offered{false};  ///< written in setup
     /// written by the thread of the node: active while it may send
     std::atomic<State> state{State::down};
-    std::atomic<std::int64_t> latest{INT64_MIN};  ///< written by the thread of the node: its time
     Description description;  ///< of the link of the node; written by offer_slots()
+    const std::shared_ptr<link::CallOrder> order;
 
 private:
     std::array<std::atomic<SlotUser*>, max_users> users_{};

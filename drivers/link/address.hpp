@@ -120,7 +120,7 @@ struct Driver {
     /// how its links are in the journal of a machine
     enum class Journal : std::uint8_t {
         results,  ///< what they give their user
-        order,  ///< the order of the calls: a bus in memory is executed again
+        order,  ///< the order of the calls: a bus or queues in memory are executed again
         carrier,  ///< not at all: their frames travel on another link, which is in the journal
     } journal = Journal::results;
 
@@ -188,7 +188,7 @@ std::string split_target(const Driver& driver, std::string_view text, std::strin
 template <class Opened>
 struct JournaledOpen {
     Opened (*results)(const std::function<Opened()>& open);
-    Opened (*order)(std::string_view target, const std::function<Opened()>& open);
+    Opened (*order)(std::string_view address, const std::function<Opened()>& open);
 
     /// Opens a link with the driver, as the journal of the calling program has its links.
     template <class Options, class Description>
@@ -197,7 +197,9 @@ struct JournaledOpen {
         using Journal = typename Driver<Opened, Options, Description>::Journal;
         const auto open = [&] { return driver.open(target, options); };
         if (driver.journal == Journal::results && results != nullptr) return results(open);
-        if (driver.journal == Journal::order && order != nullptr) return order(target, open);
+        if (driver.journal == Journal::order && order != nullptr) {
+            return order(std::string(driver.name()) + ":" + target, open);
+        }
         return open();
     }
 };

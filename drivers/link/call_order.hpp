@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The order of the calls on a bus in memory, in the journal of the program that uses it. The bus is
-// executed again, with the calls in the order of then.
+// The order of the calls on a bus or on queues in memory, in the journal of the program that uses
+// them. They are executed again, with the calls in the order of then.
 #pragma once
 
 #include <atomic>
@@ -20,12 +20,13 @@ namespace hal::link {
 /// Lets one journaled call at a time use a bus. Its links share it.
 class CallOrder {
 public:
-    /// Returns that of the bus behind an address, `sim:NAME/STATION?option`. [setup]
-    static std::shared_ptr<CallOrder> of(std::string_view kind, std::string_view target) {
+    /// Returns that of the bus behind an address, `sim:NAME/STATION?option`. `kind` tells buses of
+    /// the same name apart. [setup]
+    static std::shared_ptr<CallOrder> of(std::string_view kind, std::string_view address) {
         static std::mutex mutex;
         static std::map<std::string, std::weak_ptr<CallOrder>> all;
         const std::string name =
-            std::string(kind) + ":" + std::string(target.substr(0, target.find_first_of("/?")));
+            std::string(kind) + ":" + std::string(address.substr(0, address.find_first_of("/?")));
         const std::lock_guard lock(mutex);
         std::shared_ptr<CallOrder> order = all[name].lock();
         if (!order) {

@@ -357,10 +357,10 @@ private:
 TEST(OrderedLink, Keeps_frames_while_another_thread_has_the_bus) {
     std::vector<std::string> texts;
     twice([&texts](bool again) {
-        const auto order = link::CallOrder::of("can", "held-bus");
+        const auto order = link::CallOrder::of("can", "sim:held-bus");
         const auto open = [] { return can::open("sim:held-bus", {.bit_rate = can::unlimited}); };
-        auto sender = can::journal::open_ordered("held-bus", open);
-        auto receiver = can::journal::open_ordered("held-bus", open);
+        auto sender = can::journal::open_ordered("sim:held-bus", open);
+        auto receiver = can::journal::open_ordered("sim:held-bus", open);
         ASSERT_TRUE(sender && receiver) << sender.problem << receiver.problem;
         std::array<can::Frame, 4> frames;
         const auto receive = [&] { return receiver.link->receive(frames, 5000); };
@@ -394,7 +394,7 @@ TEST(OrderedHold, Gives_the_outcome_of_each_try_back_and_orders_the_calls_within
     std::vector<std::string> texts;
     const std::vector<std::uint64_t> waited = twice([&texts](bool again) {
         std::atomic_flag flag;
-        const auto order = link::CallOrder::of("can", "held-flag");
+        const auto order = link::CallOrder::of("can", "sim:held-flag");
         std::string text;
         const auto attempt = [&] {
             const OrderedHold hold(flag, OrderedHold::Wait::none);

@@ -113,6 +113,29 @@ addf tdma.2.transmit servo
 start
 """
 
+# Nodes of SCoCAN are in one thread, and links that send in their slots in another one.
+TABLE = "bitrate 1M; cycle 10ms; node clock A sync; node a A; node b A; mode 0 run; 0 sync; 2 private a 0x10A"
+SLOTS_OF_A_NODE = f"""loadrt threads name1=fast period1=200000 policy1=other supervise1=60s name2=servo period2=600000 policy2=other supervise2=60s
+loadrt scocan_sync link=sim:robot node=clock table="{TABLE}"
+loadrt scocan link=sim:robot,sim:robot node=a,b table="{TABLE}"
+loadrt can_traffic names=much link=scocan:a one_node=1 id=0x200 messages=8
+loadrt can_traffic names=little link=scocan:b one_node=1 id=0x300 messages=2
+loadrt can_receive link=scocan:a,scocan:b id=0x301,0x201 fields=n:u32,m:u32
+setp much.period 0.004
+setp little.period 0.0013
+addf scocan-sync.0.receive servo
+addf scocan.0.receive servo
+addf scocan.1.receive servo
+addf much.update fast
+addf can-receive.0.update fast
+addf can-receive.1.update servo
+addf little.update fast
+addf scocan-sync.0.transmit servo
+addf scocan.0.transmit servo
+addf scocan.1.transmit servo
+start
+"""
+
 
 class ExactReplayOfBuses(Case):
     def setUp(self):
@@ -345,6 +368,23 @@ unloadrt can_faults
         self.wait_for_cycles("servo", 1000)
         self.good("shell", given="stop\nstart\n")
         self.wait_for_cycles("servo", 300)
+        self.finish(machine)
+        self.assertRegex(self.replay(), r"\nno difference, \d{5,} values compared\n$")
+
+    @needs_package("scocan")
+    def test_slots_of_a_node_in_another_thread(self):
+        machine = self.start(
+            "run",
+            self.write("a.hal", SLOTS_OF_A_NODE),
+            *("--journal", "run.mcap", "--values", "*"),
+        )
+        for receiver in ("can-receive.0", "can-receive.1"):
+            pin = f"{receiver}.received"
+            wait_until(lambda: int(self.value(pin)) > 300, f"frames of {receiver}")
+        self.good("shell", given="stop\nstart\n")
+        self.wait_for_cycles("servo", 1000)
+        self.good("shell", given="unloadrt scocan.0\n")
+        self.wait_for_cycles("fast", 300)
         self.finish(machine)
         self.assertRegex(self.replay(), r"\nno difference, \d{5,} values compared\n$")
 

@@ -155,9 +155,9 @@ private:
 
 }  // namespace
 
-Opened open_ordered(std::string_view target, const std::function<Opened()>& open) {
+Opened open_ordered(std::string_view address, const std::function<Opened()>& open) {
     if (link::journal_mode() == link::JournalMode::none) return open();
-    std::shared_ptr<CallOrder> order = CallOrder::of("can", target);
+    std::shared_ptr<CallOrder> order = CallOrder::of("can", address);
     const OrderedCall call(*order, Wait::made);
     Opened opened = open();
     if (!opened) return opened;

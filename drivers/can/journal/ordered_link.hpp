@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A link of a bus in memory, whose calls are ordered by the journal of the program that uses it.
+// A link of what is in memory, a bus or the queues of a node, whose calls are ordered by the journal
+// of the program that uses it.
 #pragma once
 
 #include <functional>
@@ -9,8 +10,8 @@
 
 namespace hal::can::journal {
 
-/// Opens a link of the bus `sim:target` with `open`. Under a journal the order of the calls on the
-/// bus is recorded, or repeated. [setup]
-Opened open_ordered(std::string_view target, const std::function<Opened()>& open);
+/// Opens a link with `open`. Under a journal the order of the calls on all links of what `address`
+/// names, as in sim:NAME or scocan:NODE, is recorded, or repeated. [setup]
+Opened open_ordered(std::string_view address, const std::function<Opened()>& open);
 
 }  // namespace hal::can::journal

@@ -140,9 +140,9 @@ private:
 
 }  // namespace
 
-Opened open_ordered(std::string_view target, const std::function<Opened()>& open) {
+Opened open_ordered(std::string_view address, const std::function<Opened()>& open) {
     if (link::journal_mode() == link::JournalMode::none) return open();
-    std::shared_ptr<CallOrder> order = CallOrder::of("ethernet", target);
+    std::shared_ptr<CallOrder> order = CallOrder::of("ethernet", address);
     const OrderedCall call(*order, Wait::made);
     Opened opened = open();
     if (!opened) return opened;

@@ -10,8 +10,8 @@
 
 namespace hal::ethernet::journal {
 
-/// Opens a port of the segment `sim:target` with `open`. Under a journal the order of the calls on
-/// the segment is recorded, or repeated. [setup]
-Opened open_ordered(std::string_view target, const std::function<Opened()>& open);
+/// Opens a port of the segment `sim:NAME` with `open`. Under a journal the order of the calls on the
+/// segment is recorded, or repeated. [setup]
+Opened open_ordered(std::string_view address, const std::function<Opened()>& open);
 
 }  // namespace hal::ethernet::journal

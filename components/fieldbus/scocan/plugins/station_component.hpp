@@ -10,10 +10,10 @@
 
 #include "bus/component/bit_rate.hpp"
 #include "bus/component/bus_component.hpp"
-#include "discipline/slot_exchange.hpp"
 #include "event_texts.hpp"
 #include "hal/reporter.hpp"
 #include "message_pins.hpp"
+#include "slot_links.hpp"
 #include "station_pins.hpp"
 #include "table_arguments.hpp"
 
@@ -52,8 +52,7 @@ public:
                 "missing table: write link=sim:NAME config=FILE.scocan node=NAME");
         }
         std::unique_ptr<can::Link> link = open_link();
-        exchange_ = can::offer_slots(arguments_.node.get(), link->description());
-        if (!exchange_) {
+        if (!links_.offer(arguments_.node.get(), link->description())) {
             throw std::runtime_error("node " + arguments_.node.get() +
                                      " is in this process already; load each node once");
         }
@@ -73,11 +72,7 @@ public:
     }
 
     void stop() noexcept {
-        if (exchange_) {
-            can::withdraw_slots(*exchange_);
-            drop_outgoing();  // behind that, no link sends
-        }
-        exchange_.reset();
+        links_.withdraw();
         if (station_) {
             station_->detach();
         }
@@ -103,7 +98,8 @@ public:
             pins_.fault = is_offline(turn) || fault_.lasts();
         }
         if (is_offline(turn)) {
-            exchange_->state.store(can::State::down, std::memory_order_relaxed);
+            links_.set_state(can::State::down);
+            links_.publish();
             for (auto& m : received_) {
                 m.show(now_);
             }
@@ -112,9 +108,9 @@ public:
             return;
         }
         station_->receive(now_);
-        exchange_->state.store(
-            station_->state() == State::running ? can::State::active : can::State::down,
-            std::memory_order_relaxed);
+        links_.set_state(station_->state() == State::running ? can::State::active
+                                                             : can::State::down);
+        links_.publish();
         for (auto& m : received_) {
             m.show(now_);
         }
@@ -130,7 +126,8 @@ public:
         if (!functions_.transmit(cycle)) {
             if (functions_.receive_is_missing()) {
                 interrupt();
-                exchange_->state.store(can::State::down, std::memory_order_relaxed);
+                links_.set_state(can::State::down);
+                links_.publish();
             }
             return;
         }
@@ -138,18 +135,7 @@ public:
         for (auto& m : sent_) {
             m.transmit(*station_, now_);
         }
-        exchange_->each([this](can::SlotUser& user) {
-            while (const can::SlotFrame* next = user.outgoing.front()) {
-                if (station_->is_full()) {
-                    break;  // it waits for the next cycle
-                }
-                const can::Sent result = station_->send(next->frame, false, next->slot);
-                if (result != can::Sent::queued) {
-                    user.rejected.fetch_add(1, std::memory_order_relaxed);
-                }
-                user.outgoing.drop();
-            }
-        });
+        links_.forward(*station_);
         before_slots(cycle.period_ns());
         station_->transmit(now_, cycle.period_ns());
     }
@@ -166,14 +152,11 @@ protected:
         if (ReceivedMessage* const m = by_id_[frame.id % identifiers]) {
             m->arrived(frame, begin);
         }
-        exchange_->each([&](can::SlotUser& user) {
-            if (frame.id < configuration_ids ||
-                frame.id > node_id + arguments_.table.nodes.size()) {
-                if (!user.incoming.push(frame)) {
-                    user.lost.fetch_add(1, std::memory_order_relaxed);
-                }
-            }
-        });
+        const bool is_configuration =
+            frame.id >= configuration_ids && frame.id <= node_id + arguments_.table.nodes.size();
+        if (!is_configuration) {
+            links_.accept(frame);
+        }
         passed(frame);
     }
     void on_sent(const can::Frame& frame, Time) noexcept override {
@@ -230,8 +213,7 @@ protected:
         try {
             clock_.claim();
         } catch (...) {
-            can::withdraw_slots(*exchange_);
-            exchange_.reset();
+            links_.withdraw();
             throw;
         }
     }
@@ -245,17 +227,8 @@ protected:
     /// Begins anew after the thread was stopped. [realtime]
     void restart() noexcept {
         station_->restart(now_);
-        drop_outgoing();
+        links_.drop_queued();
         discipline_.lose();
-    }
-    /// Drops what waits in the links, which count it. [realtime]
-    void drop_outgoing() noexcept {
-        exchange_->each([](can::SlotUser& user) {
-            while (user.outgoing.front() != nullptr) {
-                user.outgoing.drop();
-                user.rejected.fetch_add(1, std::memory_order_relaxed);
-            }
-        });
     }
 
     /// Synchronises the threads of this process: their cycles begin with slots. [realtime]
@@ -296,7 +269,7 @@ protected:
     std::optional<EventTexts> texts_;
     std::unique_ptr<Station> station_;
     std::unique_ptr<hal::Reporter<EventRecord>> reporter_;  // behind the texts that its thread uses
-    std::shared_ptr<can::SlotExchange> exchange_;
+    SlotLinks links_;
     std::unique_ptr<can::Link> link_;
     hal::LastingFault fault_;
     std::array<Time, 32> raised_{};
