@@ -60,7 +60,7 @@ struct Sampler : hal::Component {
         if (head == 0 && fifo.lost == 0) {
             count_discarded(fifo);
         }
-        std::uint64_t held = head - __atomic_load_n(&fifo.tail, __ATOMIC_ACQUIRE);
+        std::uint64_t held = head - columns.count_of_program();
         const bool no_space = held + count > fifo.depth;
         const bool wanted = enable && is_new();
         if (wanted && !no_space) {

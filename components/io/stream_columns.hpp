@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "hal/any_pin.hpp"
+#include "hal/journal.hpp"
 #include "hal/naming.h"
 #include "hal/stream_times.h"
 
@@ -111,8 +112,10 @@ public:
     }
 
     /// Makes the FIFO known to the programs outside as the instance's own name; a host without
-    /// streams is all right. In start(). [setup]
+    /// streams is all right. What a function takes from the programs is in the journal: by
+    /// count_of_program() and record_of_program(). In start(). [setup]
     void publish(const hal_host& host) {
+        const hal::JournaledSource journaled;
         const auto* streams = hal::extension<hal_stream_host>("hal.stream/1");
         if (streams != nullptr && !streams->publish(&host, "", &fifo_)) {
             throw std::runtime_error("the stream could not be published");
@@ -120,6 +123,18 @@ public:
     }
 
     hal_stream& fifo() noexcept { return fifo_; }
+    /// Returns how many records the other end of the FIFO, which is a program's, has written or
+    /// taken. Once in a cycle. [realtime]
+    std::uint64_t count_of_program() noexcept {
+        const std::uint64_t& count = fifo_.to_machine ? fifo_.head : fifo_.tail;
+        return count_of_program_(__atomic_load_n(&count, __ATOMIC_ACQUIRE));
+    }
+    /// Returns a record that a program has written. [realtime]
+    const hal_value* record_of_program(std::uint64_t number) noexcept {
+        hal_value* const values = record(number);
+        hal::journaled(values, fifo_.columns);
+        return values;
+    }
     /// The samples in a cycle. [realtime]
     std::size_t samples() const noexcept { return samples_; }
     /// The pins, each with its slot. [realtime]
@@ -159,6 +174,7 @@ private:
     std::vector<hal_value> values_;
     std::vector<std::int64_t> times_;
     std::vector<std::uint64_t> losses_;
+    hal::JournaledValue<std::uint64_t> count_of_program_;
     hal_timed_stream timed_{};
     hal_stream& fifo_ = timed_.stream;
 };

@@ -44,12 +44,12 @@ struct Streamer : hal::Component {
     void play(hal::Cycle) noexcept {
         hal_stream& fifo = columns.fifo();
         const std::uint64_t tail = fifo.tail;
-        const std::uint64_t held = __atomic_load_n(&fifo.head, __ATOMIC_ACQUIRE) - tail;
+        const std::uint64_t held = columns.count_of_program() - tail;
         waiting = static_cast<std::int32_t>(held);
         empty = held == 0;
         if (due() && enable) {
             if (held > 0) {
-                read(columns.record(tail));
+                read(columns.record_of_program(tail));
                 __atomic_store_n(&fifo.tail, tail + 1, __ATOMIC_RELEASE);
             } else {
                 underruns =

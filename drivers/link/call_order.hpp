@@ -20,8 +20,8 @@ namespace hal::link {
 /// Lets one journaled call at a time use a bus. Its links share it.
 class CallOrder {
 public:
-    /// Returns that of the bus behind an address, `sim:NAME/STATION?option`. `kind` tells buses of
-    /// the same name apart. [setup]
+    /// Returns that of the bus behind an address, `sim:NAME/STATION?option`. Buses of different
+    /// `kind` are different ones. [setup]
     static std::shared_ptr<CallOrder> of(std::string_view kind, std::string_view address) {
         static std::mutex mutex;
         static std::map<std::string, std::weak_ptr<CallOrder>> all;

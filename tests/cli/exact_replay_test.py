@@ -74,6 +74,15 @@ net phase-B shaft.phase-B => turns.phase-B
 net phase-Z shaft.phase-Z => turns.phase-Z
 """
 
+UNRECORDED = """loadrt threads name1=servo period1=1000000
+loadrt unrecorded
+loadrt integ names=sum
+addf unrecorded.0 servo
+addf sum servo
+net value unrecorded.0.out => sum.in
+net total sum.out
+"""
+
 STREAM = """loadrt threads name1=servo period1=1000000
 loadrt streamer
 loadrt integ names=sum
@@ -81,6 +90,9 @@ addf streamer.0 servo
 addf sum servo
 net value streamer.0.pin.0 => sum.in
 net total sum.out
+loadrt sampler depth=200
+addf sampler.0 servo
+net total sampler.0.pin.0
 """
 
 
@@ -852,28 +864,37 @@ start
         text = self.replay("--show", "total")
         self.assertRegex(text, r"no difference, \d{3,} values compared\ntotal 10\n")
 
-    def test_the_first_difference_is_named(self):
+    def test_the_records_that_programs_feed_and_take_are_recorded(self):
         machine = self.run_journaled(STREAM, "--values", "*")
-        self.write("in.txt", "".join(f"{value}\n" for value in range(1, 40)))
+        self.comes("sampler.0.full", "TRUE")
+        self.write("in.txt", "".join(f"{value}\n" for value in range(1, 2000)))
         self.good("play", "in.txt")
-        self.comes("streamer.0.pin.0", "39")
+        self.good("record", "-n", "100", "out.txt")
+        self.comes("streamer.0.pin.0", "1999")
+        self.finish(machine)
+        text = self.replay("--show", "streamer.0.pin.0")
+        self.assertNotIn("not in the journal", text)
+        self.assertRegex(text, r"no difference, \d{4,} values compared\nstreamer.0.pin.0 1999\n")
+
+    def test_the_first_difference_is_named(self):
+        machine = self.run_journaled(UNRECORDED, "--values", "*")
+        self.wait_for_cycles(100)
         self.finish(machine)
         text = self.replay(status=1)
         self.assertIn(
-            "'streamer.0' (streamer) has 1 stream, whose data are not in the journal", text
+            "'unrecorded.0' (unrecorded) has 1 stream, whose data are not in the journal", text
         )
         self.assertRegex(
             text,
-            r"first difference: '(streamer\.0\.\S+|value)' \('streamer\.0' of streamer, function "
-            r"'streamer\.0'\) in cycle \d+ of thread 'servo': \S+ instead of \S+",
+            r"first difference: '(sum\.in|unrecorded\.0\.\S+|value)' \('unrecorded\.0' of unrecorded, function "
+            r"'unrecorded\.0'\) in cycle \d+ of thread 'servo': \S+ instead of \S+",
         )
         self.assertRegex(
             text,
-            r"\ninputs of 'streamer\.0' in this cycle:\n  streamer\.0\.enable TRUE\n",
+            r"\ninputs of 'unrecorded\.0' in this cycle:\n  unrecorded\.0\.enable TRUE\n",
         )
-        machine = self.run_journaled(STREAM, name="b.mcap")
-        self.good("play", "in.txt")
-        self.comes("streamer.0.pin.0", "39")
+        machine = self.run_journaled(UNRECORDED, name="b.mcap")
+        self.wait_for_cycles(100)
         self.finish(machine)
         self.assertRegex(
             self.replay(name="b.mcap", status=1),

@@ -24,13 +24,15 @@ struct OutsideWorld {
     std::size_t threads = 0;
     std::size_t helpers = 0;  ///< threads of work that a re-execution leaves out
     std::size_t links = 0;    ///< to buses of the outside, whose results are in the journal
-    std::size_t streams = 0;  ///< of records, which programs outside may feed
+    /// of records, which programs outside may feed or read
+    std::size_t streams = 0;
     /// Leaves out what journaled links have, and counts these.
     void remove_links(const OutsideWorld& others) {
         std::erase_if(files, [&others](const std::string& file) {
             return std::ranges::find(others.files, file) != others.files.end();
         });
         threads -= std::min(threads, others.threads);
+        streams -= std::min(streams, others.streams);
         links += others.links;
     }
     bool empty() const {

@@ -54,12 +54,13 @@ Failure SessionState::start(Instance& instance) {
         return start_instance(instance, model, *executor, status, event_log.for_plugins());
     }
     const Acquisition acquisition;
+    setup->begin_start(instance);
     Failure failure = start_instance(instance, model, *executor, status, event_log.for_plugins());
     OutsideWorld outside = acquisition.result();
+    outside.streams = instance.streams.size();
     outside.remove_links(setup->take_acquired());
     outside.helpers = std::min(instance.helpers, outside.threads);
     outside.threads -= outside.helpers;
-    outside.streams = instance.streams.size();
     if (failure.empty() && !outside.empty()) {
         options.sink->opened(instance.name, instance.component->name, outside);
     }

@@ -14,6 +14,7 @@
 #include "execute/core.hpp"
 #include "machine/load/setup_call.hpp"
 #include "machine/run/execution_sink.hpp"
+#include "model/model.hpp"
 
 namespace hal {
 namespace {
@@ -91,7 +92,10 @@ void SetupJournal::order_call(std::uint64_t ticket) {
 
 bool SetupJournal::hide_readings(bool hidden) { return std::exchange(hidden_, hidden); }
 
-void SetupJournal::begin_link() { before_link_.emplace(); }
+void SetupJournal::begin_link() {
+    before_link_.emplace();
+    streams_before_link_ = starting_ ? starting_->streams.size() : 0;
+}
 
 void SetupJournal::end_link() {
     if (!before_link_) return;
@@ -99,6 +103,9 @@ void SetupJournal::end_link() {
     before_link_.reset();
     acquired_.threads += found.threads;
     ++acquired_.links;
+    if (starting_) {
+        acquired_.streams += starting_->streams.size() - streams_before_link_;
+    }
     std::ranges::move(found.files, std::back_inserter(acquired_.files));
 }
 

@@ -17,6 +17,7 @@
 namespace hal {
 
 class ExecutionSink;
+struct Instance;
 
 /// [setup] throughout, with the session's lock held. There is one at a time in a process.
 class SetupJournal final : public SetupReader {
@@ -39,7 +40,10 @@ public:
     /// The readings are those of a driver. Returns what it was before.
     bool hide_readings(bool hidden);
 
-    /// What a link acquires between these two calls has its results in the journal.
+    /// The instance that is started next.
+    void begin_start(const Instance& instance) { starting_ = &instance; }
+    /// What a link acquires between these two calls has its results in the journal, and so have the
+    /// streams that the instance publishes.
     void begin_link();
     void end_link();
     /// Returns what was acquired by links since the last call.
@@ -70,7 +74,9 @@ private:
     std::vector<SetupResults> calls_;
     std::vector<std::uint64_t> ordered_;  // tickets of the transaction
     std::vector<SetupFile> files_;
+    const Instance* starting_ = nullptr;
     std::optional<Acquisition> before_link_;
+    std::size_t streams_before_link_ = 0;
     OutsideWorld acquired_;
 };
 
