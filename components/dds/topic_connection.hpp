@@ -10,6 +10,7 @@
 
 #include "dds/arguments.hpp"
 #include "dds/status.hpp"
+#include "hal/journal.hpp"
 
 namespace hal::dds {
 
@@ -19,9 +20,12 @@ template <class Endpoint>
 class TopicConnection {
 public:
     /// Opens the participant and creates the endpoint by `make(participant)`. An exception from it
-    /// leaves nothing open. [setup]
+    /// leaves nothing open. Opens nothing when a journal is executed again: what the cycle takes
+    /// from the engine is in it. [setup]
     template <class Make>
     void open(const Arguments& arguments, const Settings& settings, Served& served, Make make) {
+        if (hal::is_executed_again()) return;
+        const hal::JournaledSource journaled;
         auto participant = dds::open(settings);
         endpoint_ = make(*participant);
         participant_ = std::move(participant);
@@ -77,6 +81,10 @@ public:
         default: break;
         }
     }
+    /// For the cycle, once in each. [realtime]
+    std::uint32_t matched_of_cycle() noexcept { return seen_matched_(matched()); }
+    /// The same of wrong_type(). [realtime]
+    bool wrong_type_of_cycle() noexcept { return seen_wrong_type_(wrong_type()); }
     /// [any]
     std::uint32_t matched() const noexcept { return matched_.load(std::memory_order_relaxed); }
     /// [any]
@@ -85,6 +93,8 @@ public:
 private:
     std::atomic<std::uint32_t> matched_{0};
     std::atomic<bool> wrong_type_{false};
+    hal::JournaledValue<std::uint32_t> seen_matched_;  // by the cycle, as the next one
+    hal::JournaledValue<bool> seen_wrong_type_;
     std::shared_ptr<Participant> participant_;
     std::shared_ptr<Beacon> beacon_;
     std::unique_ptr<Endpoint> endpoint_;

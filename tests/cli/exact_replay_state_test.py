@@ -11,9 +11,6 @@ from harness import HAL, ROOT, SANITIZED, Case, wait_until
 # belongs here only when what it computes is not a function of its inputs and of its links.
 OPENS = r"'{instance}' \({name}\) opens again: "
 WITHOUT_STATE = {
-    "dds_publish": OPENS,
-    "dds_subscribe": OPENS,
-    "node": OPENS,
     "segment_record": OPENS,
 }
 THREAD = "loadrt threads name1=servo period1=2000000\n"

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "cli"))
-from harness import HAL, Case, wait_until  # noqa: E402, F401
+from harness import HAL, SANITIZED, Case, wait_until  # noqa: E402, F401
 from own_network import dds_domain, own_network  # noqa: E402, F401
 
 ROGUE = Path(os.environ.get("DDS_ROGUE") or HAL.parent / "dds_rogue")
@@ -39,13 +39,13 @@ class DdsCase(Case):
         if os.environ.get("HALCYON_PLUGIN_PATH"):
             self.environment["HALCYON_PLUGIN_PATH"] = os.environ["HALCYON_PLUGIN_PATH"]
 
-    def machine(self, instance, netlist):
+    def machine(self, instance, netlist, *options):
         """Starts a machine; words(instance) returns its standard error."""
         self.write(instance + ".hal", netlist)
         log = open(self.folder / (instance + ".log"), "a")
         self.addCleanup(log.close)
         process = subprocess.Popen(
-            ["hal", "run", "--name", instance, instance + ".hal"],
+            ["hal", "run", "--name", instance, instance + ".hal", *options],
             executable=str(HAL),
             cwd=self.folder,
             env=self.environment,

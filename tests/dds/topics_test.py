@@ -10,7 +10,7 @@ import unittest
 
 from pathlib import Path
 
-from rig import DOMAIN, DdsCase, wait_until
+from rig import DOMAIN, FIELDS, PUBLISH, SANITIZED, SUBSCRIBE, DdsCase, wait_until
 
 # The participant uses loopback only; the writer's QoS is incompatible with dds_subscribe's readers.
 PROFILE = """<?xml version="1.0" encoding="UTF-8"?>
@@ -368,6 +368,29 @@ class Topics(DdsCase):
             self.assertIn(
                 reason, self.run_program("run", "--for", "10ms", "bad.hal").stderr, arguments
             )
+
+    @unittest.skipIf(SANITIZED, "a sanitizer has the functions of the clock")
+    def test_what_was_received_is_executed_again_from_the_journal(self):
+        more = f"domain={DOMAIN} timeout_ms=200"
+        journaled = ["--values", "*", "--journal"]
+        publisher = self.machine(
+            "publisher", PUBLISH.format(angle=2.5, more=f"domain={DOMAIN}"), *journaled, "out.mcap"
+        )
+        subscriber = self.machine(
+            "subscriber", SUBSCRIBE.format(fields=FIELDS, more=more), *journaled, "in.mcap"
+        )
+        self.shows("2.5", "TRUE", "0", "-5")
+        self.good("shell", "--name", "publisher", given="setp pub.angle 3.5\n")
+        self.shows("3.5", "TRUE", "0", "-5")
+        wait_until(lambda: int(self.value("pub.sent", "publisher")) > 100, "samples")
+        self.end_quietly(publisher)
+        self.becomes("sub.valid", "FALSE")
+        self.end_quietly(subscriber)
+        self.environment["HALCYON_LINKS_INSIDE"] = "1"  # no DDS
+        for journal in ("out.mcap", "in.mcap"):
+            done = self.run_program("replay", "--exact", journal)
+            self.assertEqual((0, ""), (done.returncode, done.stderr), done.stdout)
+            self.assertRegex(done.stdout, r"\nno difference, \d{4,} values compared\n$")
 
 
 if __name__ == "__main__":

@@ -42,22 +42,32 @@ public:
         if (left_-- > 0) return;
         left_ = every_ - 1;
         if (enable) {
-            if (std::uint8_t* to = outbox_.begin()) {
-                fields_.store(to);
-                outbox_.commit(cycle.start_ns());
-            } else {
-                dropped = dropped + 1;
-            }
+            queue_sample(cycle.start_ns());
         }
         // After the sample, so that a reader of this sees the sample too.
         due_.store(cycle.start_ns() + every_ * period_, std::memory_order_release);
-        sent = sent_.load(std::memory_order_relaxed);
-        rejected = rejected_.load(std::memory_order_relaxed);
-        matched = connection_.matched();
-        wrong_type = connection_.wrong_type();
+        sent = seen_sent_(sent_.load(std::memory_order_relaxed));
+        rejected = seen_rejected_(rejected_.load(std::memory_order_relaxed));
+        matched = connection_.matched_of_cycle();
+        wrong_type = connection_.wrong_type_of_cycle();
     }
 
 private:
+    /// Stores the pins into the next slot of the outbox. [realtime]
+    void queue_sample(std::int64_t now) noexcept {
+        std::uint8_t* const slot = outbox_.begin();
+        bool has_space = slot != nullptr;
+        hal::journaled(has_space);
+        if (!has_space || slot == nullptr) {
+            dropped = dropped + 1;
+            return;
+        }
+        fields_.store(slot);
+        outbox_.commit(now);
+        if (hal::is_executed_again()) {
+            outbox_.take();  // nothing is published again
+        }
+    }
     static std::int64_t clock(clockid_t id) noexcept {
         timespec t{};
         clock_gettime(id, &t);
@@ -158,6 +168,7 @@ private:
     std::int64_t period_ = 0;
     std::int64_t every_ = 1;
     std::int64_t left_ = 0;
+    hal::JournaledValue<std::uint64_t> seen_sent_, seen_rejected_;
     // Between the cycle and the DDS thread
     Outbox outbox_{schema_.sample, 64};
     std::atomic<std::int64_t> due_{0};  // when the next sample is made

@@ -16,9 +16,8 @@ namespace {
 
 using namespace hal::dds;
 
-/// The newest sample, for the cycle.
-struct Message {
-    std::vector<hal_value> values;
+/// What is known about a sample.
+struct SampleInfo {
     std::int64_t monotonic_ns = 0;  // reception time
     std::int64_t transit_ns = 0;    // its age at reception, by the writer's clock
     std::uint64_t sequence = 0;
@@ -30,6 +29,11 @@ struct Message {
     bool is_complete = true;  // each joint has had a value
     std::size_t oldest_joint = 0;
     std::int64_t lag_ns = 0;  // from the newest value of that joint to this sample
+};
+
+/// The newest sample, for the cycle.
+struct Message : SampleInfo {
+    std::vector<hal_value> values;
 };
 
 class DdsSubscribe : public hal::Component, private Listener, private Served {
@@ -61,10 +65,10 @@ public:
     /// Sets the pins from the newest sample; without one within the timeout they are not valid.
     /// [realtime]
     void take(hal::Cycle cycle) noexcept {
-        bool fresh = false;
-        const Message& m = mailbox_.get(&fresh);
+        const bool is_fresh = receive();
+        const Message& m = taken_;
         const std::int64_t now = cycle.start_ns();
-        if (fresh) {
+        if (is_fresh) {
             fields_.load(m.values.data());
             // A virtual clock has another origin: then the sample counts as received now.
             constexpr std::int64_t max_wait_ns = 10'000'000'000;
@@ -96,19 +100,33 @@ public:
         valid = good;
         const State sample_state = good ? State::valid : State::stale;
         state_.store(have_ ? sample_state : State::waiting, std::memory_order_relaxed);
-        matched = connection_.matched();
-        malformed = malformed_.load(std::memory_order_relaxed);
-        wrong_type = connection_.wrong_type();
-        silent = silent_.load(std::memory_order_relaxed);
+        matched = connection_.matched_of_cycle();
+        malformed = counted_.malformed(malformed_.load(std::memory_order_relaxed));
+        wrong_type = connection_.wrong_type_of_cycle();
+        silent = counted_.silent(silent_.load(std::memory_order_relaxed));
         watch_second_writer(now);
-        ignored = ignored_.load(std::memory_order_relaxed);
-        flood = flood_.load(std::memory_order_relaxed);
+        ignored = counted_.ignored(ignored_.load(std::memory_order_relaxed));
+        flood = counted_.flood(flood_.load(std::memory_order_relaxed));
+    }
+
+    /// Takes the newest sample of the engine, or of the journal. Returns false when there is no
+    /// other one than in the cycle before. [realtime]
+    bool receive() noexcept {
+        bool is_fresh = false;
+        const Message& newest = mailbox_.get(&is_fresh);
+        hal::journaled(is_fresh);
+        if (!is_fresh) return false;
+        std::copy(newest.values.begin(), newest.values.end(), taken_.values.begin());
+        static_cast<SampleInfo&>(taken_) = newest;
+        hal::journaled(taken_.values.data(), taken_.values.size());
+        hal::journaled(static_cast<SampleInfo&>(taken_));
+        return true;
     }
 
     /// A second writer of a topic is a fault only where the values must be of one writer.
     /// [realtime]
     void watch_second_writer(std::int64_t now) noexcept {
-        const std::uint64_t others = others_.load(std::memory_order_relaxed);
+        const std::uint64_t others = counted_.others(others_.load(std::memory_order_relaxed));
         if (others != others_seen_) {
             others_seen_ = others;
             second_until_ = now + second;
@@ -125,6 +143,11 @@ public:
 
 private:
     enum class State { waiting, valid, stale };
+    /// What the cycle reads of the engine's threads besides samples.
+    struct Counted {
+        hal::JournaledValue<std::uint64_t> malformed, ignored, others;
+        hal::JournaledValue<bool> silent, flood;
+    };
     static constexpr std::int64_t second = 1'000'000'000;
 
     /// A topic has one owner: the first publisher, until it sends nothing for half of the timeout
@@ -370,6 +393,8 @@ private:
     std::int64_t sample_seen_ = 0;
     std::int64_t transit_ = 0;
     bool have_ = false;
+    Message taken_{{}, std::vector<hal_value>(schema_.fields.size())};
+    Counted counted_;
     std::uint64_t others_seen_ = 0;
     std::int64_t second_until_ = INT64_MIN;
     std::string stale_text_;
@@ -379,7 +404,7 @@ private:
     const std::string second_text_ =
         "a second publisher writes topic '" + topic_.name + "'; its samples are ignored";
     // The engine's threads', one at a time
-    Message message_{std::vector<hal_value>(schema_.fields.size())};
+    Message message_{{}, std::vector<hal_value>(schema_.fields.size())};
     std::array<std::uint8_t, 16> writer_{}, owner_{};
     std::int64_t owner_at_ = 0;
     std::uint64_t arrivals_ = 0;

@@ -20,6 +20,7 @@
 #include "dds/links/links.hpp"
 #include "dds/status.hpp"
 #include "hal/age.hpp"
+#include "hal/journal.hpp"
 
 namespace {
 
@@ -86,6 +87,8 @@ struct Other {
     // Between the engine and the cycle
     std::atomic<std::int64_t> status_at{0};  ///< reception of its last status, CLOCK_MONOTONIC
     std::atomic<bool> differs{false};
+    hal::JournaledValue<std::int64_t> seen_status_at;  // by the cycle, as the next one
+    hal::JournaledValue<bool> seen_differs;
     // The engine's
     std::string reported;
     std::int64_t reported_at = 0;
@@ -98,6 +101,9 @@ public:
     using Component::Component;
 
     void start() {
+        if (hal::is_executed_again())
+            return;  // what the cycle reads of the others is in the journal
+        const hal::JournaledSource journaled;
         participant_ = open(settings_);
         Quality quality = status_quality();
         quality.depth = 64;
@@ -145,11 +151,12 @@ public:
     /// [realtime]
     void watch(hal::Cycle cycle) noexcept {
         for (Other& other : others_) {
-            const std::int64_t status_at = other.status_at.load(std::memory_order_relaxed);
+            const std::int64_t status_at =
+                other.seen_status_at(other.status_at.load(std::memory_order_relaxed));
             const double since = static_cast<double>(cycle.start_ns() - status_at) * 1e-6;
             const bool there =
                 status_at != 0 && since < static_cast<double>(5 * status_period_ns) * 1e-6;
-            other.incompatible = other.differs.load(std::memory_order_relaxed);
+            other.incompatible = other.seen_differs(other.differs.load(std::memory_order_relaxed));
             const bool sends = !other.received.empty();
             other.online = !other.incompatible && (sends ? other.all_valid() : there);
             if (sends) {
