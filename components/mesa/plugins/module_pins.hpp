@@ -7,13 +7,16 @@
 #include <string>
 #include <vector>
 
+#include "bus/component/working_set.hpp"
 #include "hal/component.hpp"
 #include "mesa/driver/card_image.hpp"
 #include "mesa/driver/outgoing.hpp"
 #include "mesa/driver/read_layout.hpp"
-#include "working_set.hpp"
 
 namespace hal::mesa {
+
+using bus::place;
+using bus::Placed;
 
 /// The component and its functions, while pins are declared.
 struct PinOwner {

@@ -33,19 +33,21 @@ public:
     }
     /// Begins a function of the cycle. [realtime]
     void take() noexcept {
-        if (words_ == 0) return;
+        if (!is_journaled()) return;
         if (is_executed_again()) {
             give_back();
         } else {
             record();
         }
     }
+    /// Returns whether there is a journal. [realtime]
+    bool is_journaled() const noexcept { return words_ != 0; }
     /// What the cycle sees.
     const Image& seen() const noexcept { return seen_; }
     /// Takes the oldest event. [realtime]
     bool pop(EventRecord& event) noexcept {
         const bool has_one = seen_.pop(event);
-        if (has_one && words_ != 0) {
+        if (has_one && is_journaled()) {
             engine_.header().event_tail.store(seen_.header().event_tail.load(),
                                               std::memory_order_release);
         }

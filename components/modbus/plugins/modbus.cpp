@@ -38,11 +38,13 @@ struct Modbus : hal::bus::BusComponent {
             broadcasts_.emplace(*this, receive_, "broadcasts",
                                 "how often the broadcast stop was sent; no slave acknowledges it");
         }
+        memory_ = hal::bus::allocate_in_instance(Image::size_of(bus, arguments_.plan), 64);
         for (std::size_t n = 0; n < bus.slaves.size(); ++n) {
-            slaves_.emplace_back(*this, receive_, transmit_, bus, arguments_.plan, n,
-                                 SharedPins{set_points_, ages_});
+            slaves_.push_back(hal::bus::place<SlavePins>(*this, receive_, transmit_, bus,
+                                                         arguments_.plan, n,
+                                                         SharedPins{set_points_, ages_}));
             if (bus.slaves[n].drive) {
-                drives_.push_back(&slaves_.back());
+                drives_.push_back(slaves_.back().get());
             }
             faults_of_slaves_.emplace_back();
             stop_faults_of_slaves_.emplace_back();
@@ -52,6 +54,7 @@ struct Modbus : hal::bus::BusComponent {
     }
 
     void start() {
+        set_points_.rewrite();
         if (!arguments_.loaded) {
             throw std::runtime_error("missing configuration: write config=FILE.modbus");
         }
@@ -112,7 +115,9 @@ struct Modbus : hal::bus::BusComponent {
         const std::int64_t now = cycle.start_ns();
         followed_.take();
         alive_ = is_alive_.load(std::memory_order_acquire);
-        hal::journaled(alive_);
+        if (followed_.is_journaled()) {
+            hal::journaled(alive_);
+        }
         ImageHeader& header = image_.header();
         header.cycles.count(std::max(arguments_.bus.heartbeat_ns, 3 * cycle.period_ns()));
         const hal::bus::Turn turn = receive_turn(cycle);
@@ -265,13 +270,7 @@ private:
     void start_local(const std::string& link) {
         auto opened = hal::line::open(link, arguments_.bus.line);
         if (!opened) throw std::runtime_error(opened.problem);
-        const std::size_t size = Image::size_of(arguments_.bus, arguments_.plan);
-        if (memory_.empty()) {
-            memory_.resize(size + 64);
-        }
-        void* at = memory_.data();
-        std::size_t space = memory_.size();
-        image_ = Image(std::align(64, size, at, space), arguments_.bus, arguments_.plan, true);
+        image_ = Image(memory_, arguments_.bus, arguments_.plan, true);
         has_image_ = true;
         local_ = std::make_unique<LocalMaster>(arguments_.bus, arguments_.plan, image_,
                                                std::move(opened.line));
@@ -386,7 +385,7 @@ private:
                 changed = ~std::uint64_t{0} >> (64 - count);
             }
             for (; changed != 0; changed &= changed - 1) {
-                SlavePins& slave = slaves_[word * 64 + std::countr_zero(changed)];
+                SlavePins& slave = *slaves_[word * 64 + std::countr_zero(changed)];
                 online_slaves_ -= slave.is_online() ? 1 : 0;
                 slave.show(followed_.seen(), is_alive);
                 online_slaves_ += slave.is_online() ? 1 : 0;
@@ -451,7 +450,7 @@ private:
     std::unique_ptr<hal::Reporter<EventRecord>> reporter_;
     SetPointPins set_points_;
     AgePins ages_;
-    std::deque<SlavePins> slaves_;
+    std::vector<hal::bus::Placed<SlavePins>> slaves_;
     std::vector<SlavePins*> drives_;
     std::size_t online_slaves_ = 0;
     std::deque<hal::LastingFault> faults_of_slaves_, stop_faults_of_slaves_, rejections_of_slaves_,
@@ -460,7 +459,7 @@ private:
     hal::SetupTime setup_time_;
     std::string previous_report_;
 
-    std::vector<std::byte> memory_;  // of the image of a local master
+    void* memory_ = nullptr;  // of the image of a local master
     Image image_;
     FollowedImage followed_;  // by the cycle
     bool has_image_ = false;

@@ -2,12 +2,14 @@
 // The pins of a slave, and what copies them to and from the image.
 #pragma once
 
-#include <deque>
+#include <algorithm>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "bus/component/working_set.hpp"
 #include "hal/age.hpp"
 #include "hal/any_pin.hpp"
 #include "modbus/master/drive_axis.hpp"
@@ -56,36 +58,50 @@ inline hal_type type_of(const Value& v) {
     return HAL_TYPE_U32;
 }
 
-/// The input pins of all slaves: one loop copies them.
+/// The input pins of all slaves: one loop copies them. A value is written to the image when it has
+/// changed: a cycle reads no cache line of the image for the others.
 class SetPointPins {
 public:
+    /// The image is a new one: all values are written to it. [setup]
+    void rewrite() noexcept {
+        pins_.each(
+            [](const auto&, SetPoint& set_point) { set_point.state = SetPoint::State::unwritten; });
+    }
     /// [setup]
     void declare(hal::Component& c, const hal::Function& transmit, const Value& v,
                  const std::string& name, const char* doc, std::uint32_t value) {
-        pins_.declare(c, &transmit, type_of(v), name, doc, value, {.unit = v.unit.c_str()});
+        pins_.declare(c, &transmit, type_of(v), name, doc, {.value = value},
+                      {.unit = v.unit.c_str()});
     }
     /// Copies the pins to the image. Returns whether one is not finite: its last value stays.
     /// [realtime]
     bool transmit(const Image& image) noexcept {
         bool invalid = false;
-        pins_.each([&](const auto& pin, const std::uint32_t& value) {
+        pins_.each([&](const auto& pin, SetPoint& set_point) {
             const auto number = pin.get();
-            if constexpr (std::is_same_v<std::remove_cvref_t<decltype(number)>, double>) {
-                if (!std::isfinite(number)) {
-                    invalid = true;
-                    return;
+            const std::uint64_t cell = to_cell(number);
+            if (cell != set_point.cell || set_point.state == SetPoint::State::unwritten) {
+                set_point.cell = cell;
+                const bool is_valid = is_finite(number);
+                set_point.state = is_valid ? SetPoint::State::valid : SetPoint::State::invalid;
+                if (is_valid) {
+                    image.value(set_point.value).store(cell, std::memory_order_relaxed);
                 }
             }
-            // a value that has not changed leaves the cache line to the master
-            auto& cell = image.value(value);
-            if (cell.load(std::memory_order_relaxed) != to_cell(number)) {
-                cell.store(to_cell(number), std::memory_order_relaxed);
-            }
+            invalid = invalid || set_point.state == SetPoint::State::invalid;
         });
         return invalid;
     }
 
 private:
+    template <class T>
+    static bool is_finite(T value) noexcept {
+        if constexpr (std::is_same_v<T, double>) {
+            return std::isfinite(value);
+        } else {
+            return true;
+        }
+    }
     template <class T>
     static std::uint64_t to_cell(T value) noexcept {
         if constexpr (std::is_same_v<T, double>) {
@@ -95,44 +111,46 @@ private:
         }
     }
 
-    hal::AnyIns<std::uint32_t> pins_;
+    struct SetPoint {
+        enum class State : std::uint32_t { unwritten, valid, invalid };
+        std::uint64_t cell = 0;  // of the pin in the cycle before
+        std::uint32_t value = 0;
+        State state = State::unwritten;
+    };
+
+    hal::AnyIns<SetPoint> pins_;
 };
 
 /// The pins that change in every cycle, the ages, one behind the other: a cycle reads few cache
 /// lines.
 class AgePins {
 public:
-    /// Returns the number of the pin. [setup]
-    std::size_t declare(hal::Component& c, const hal::Function& receive, const std::string& name,
-                        const char* doc) {
-        rows_.emplace_back(c, receive, name, doc);
-        return rows_.size() - 1;
-    }
-    /// Sets when the value was read, in ns; 0: never. [realtime]
-    void set(std::size_t number, std::int64_t stamp_ns) noexcept {
-        rows_[number].stamp_ns = stamp_ns;
+    /// When a value was read, in ns; 0: never.
+    struct Stamp {
+        std::int64_t ns = 0;
+    };
+    /// Returns the stamp of the pin, which the owner of the value sets. [setup]
+    Stamp& declare(hal::Component& c, const hal::Function& receive, const std::string& name,
+                   const char* doc) {
+        const hal_value infinite{.real = infinite_age};
+        return pins_.declare(c, &receive, HAL_TYPE_FLOAT, name, doc, {},
+                             {.unit = "s", .initial = infinite, .safe = infinite});
     }
     /// [realtime]
-    void show(std::int64_t now_ns) noexcept {
-        for (Row& row : rows_) {
-            row.pin = row.stamp_ns == 0 ? infinite_age : seconds_between(row.stamp_ns, now_ns);
-        }
+    void show(std::int64_t now_ns) const noexcept {
+        pins_.each([now_ns]<class T>(hal::Out<T>& pin, const Stamp& stamp) {
+            if constexpr (std::is_same_v<T, double>) {
+                pin = stamp.ns == 0 ? infinite_age : seconds_between(stamp.ns, now_ns);
+            }
+        });
     }
 
 private:
-    struct Row {
-        Row(hal::Component& c, const hal::Function& receive, const std::string& name,
-            const char* doc)
-            : pin(c, receive, name.c_str(), doc,
-                  {.initial = infinite_age, .unit = "s", .safe = infinite_age}) {}
-        std::int64_t stamp_ns = 0;
-        hal::Out<double> pin;
-    };
     static double seconds_between(std::int64_t from_ns, std::int64_t to_ns) noexcept {
         return to_ns > from_ns ? static_cast<double>(to_ns - from_ns) * 1e-9 : 0.0;
     }
 
-    std::deque<Row> rows_;
+    hal::AnyOuts<Stamp> pins_;
 };
 
 /// What the slaves of a bus have together.
@@ -147,8 +165,7 @@ public:
     SlavePins(hal::Component& c, const hal::Function& receive, const hal::Function& transmit,
               const Bus& bus, const Plan& plan, std::size_t index, SharedPins shared)
         : index_(index),
-          ages_(shared.ages),
-          age_(ages_.declare(
+          age_(shared.ages.declare(
               c, receive, name_of(bus, index) + ".age",
               "age of its oldest value; infinite: one was not read, or the thread is stopped")),
           online_(c, receive, (name_of(bus, index) + ".online").c_str(), "the slave answers",
@@ -162,18 +179,19 @@ public:
           stopped_(c, receive, (name_of(bus, index) + ".stopped").c_str(),
                    "it has acknowledged its stop telegrams") {
         const Slave& slave = bus.slaves[index];
+        Lists lists;
         for (std::uint32_t n = 0; n < plan.values.size(); ++n) {
             const PlannedValue& planned = plan.values[n];
             if (planned.slave != index) continue;
             if (!planned.value->is_output) {
-                add_reading(planned.telegram);
+                lists.add_reading(planned.telegram);
             }
-            declare(c, receive, transmit, slave.name, planned, n, shared.set_points);
+            declare(c, receive, transmit, slave.name, planned, n, shared, lists);
         }
         for (std::uint32_t n = 0; slave.drive && n < plan.telegrams.size(); ++n) {
             if (plan.telegrams[n].slave == index &&
                 plan.telegrams[n].kind == Telegram::Kind::drive) {
-                drive_telegrams_.push_back(n);
+                lists.drive_telegrams.push_back(n);
             }
         }
         if (slave.drive) {
@@ -181,6 +199,9 @@ public:
             axis_.emplace(slave.drive->max_speed_rpm, slave.drive->tolerance,
                           slave.drive->stall_ns);
         }
+        readings_ = bus::place_list(lists.readings);
+        drive_telegrams_ = bus::place_list(lists.drive_telegrams);
+        value_ages_ = bus::place_list(lists.value_ages);
     }
 
     bool is_online() const noexcept { return is_online_; }
@@ -239,8 +260,19 @@ private:
         double safe;
     };
     struct ValueAge {
-        std::size_t pin;
+        AgePins::Stamp* stamp;
         std::uint32_t value;
+    };
+    /// What the constructor collects.
+    struct Lists {
+        std::vector<std::uint32_t> readings, drive_telegrams;
+        std::vector<ValueAge> value_ages;
+
+        void add_reading(std::uint32_t telegram) {
+            if (std::find(readings.begin(), readings.end(), telegram) == readings.end()) {
+                readings.push_back(telegram);
+            }
+        }
     };
     static constexpr std::uint32_t no_value = UINT32_MAX;
 
@@ -258,18 +290,12 @@ private:
             return static_cast<T>(cell);
         }
     }
-    void add_reading(std::uint32_t telegram) {
-        if (std::find(readings_.begin(), readings_.end(), telegram) == readings_.end()) {
-            readings_.push_back(telegram);
-        }
-    }
-
     void declare(hal::Component& c, const hal::Function& receive, const hal::Function& transmit,
                  const std::string& slave, const PlannedValue& planned, std::uint32_t n,
-                 SetPointPins& set_points) {
+                 SharedPins shared, Lists& lists) {
         const Value& v = *planned.value;
         if (v.purpose != Purpose::pin) {
-            drive_telegrams_.push_back(planned.telegram);
+            lists.drive_telegrams.push_back(planned.telegram);
         }
         switch (v.purpose) {
         case Purpose::pin: break;
@@ -286,15 +312,15 @@ private:
                       bus::to_string(v.type));
         const std::string name = slave + "." + v.name;
         if (v.is_output) {
-            set_points.declare(c, transmit, v, name, doc, n);
+            shared.set_points.declare(c, transmit, v, name, doc, n);
             return;
         }
         outputs_.declare(c, &receive, type_of(v), name, doc,
                          {n, planned.telegram, v.safe.has_value(), v.safe.value_or(0.0)},
                          {.unit = v.unit.c_str()});
         if (v.has_age) {
-            value_ages_.push_back(
-                {ages_.declare(
+            lists.value_ages.push_back(
+                {&shared.ages.declare(
                      c, receive, name + "-age",
                      "age of the value; infinite: it was not read, or the thread is stopped"),
                  n});
@@ -323,9 +349,9 @@ private:
                                [&](std::uint32_t telegram) {
             return image.rejected(telegram).load(std::memory_order_relaxed) != 0;
         });
-        ages_.set(age_, oldest_of(image));
+        age_.ns = oldest_of(image);
         for (const ValueAge& age : value_ages_) {
-            ages_.set(age.pin, image.value_stamp(age.value).load(std::memory_order_relaxed));
+            age.stamp->ns = image.value_stamp(age.value).load(std::memory_order_relaxed);
         }
     }
     /// Returns the time of the oldest value; 0: one was not read.
@@ -346,16 +372,15 @@ private:
     }
 
     const std::size_t index_;
-    AgePins& ages_;
-    const std::size_t age_;  // pins of ages_
-    std::vector<ValueAge> value_ages_;
+    AgePins::Stamp& age_;  // of its oldest value
+    std::span<const ValueAge> value_ages_;
     std::unique_ptr<DrivePins> drive_;
     hal::Out<bool> online_;
     hal::Out<std::uint32_t> timeouts_, errors_, exceptions_;
     hal::Out<bool> stopped_;
     hal::AnyOuts<OutputData> outputs_;
-    std::vector<std::uint32_t> readings_;  // telegrams
-    std::vector<std::uint32_t> drive_telegrams_;
+    std::span<const std::uint32_t> readings_;  // telegrams
+    std::span<const std::uint32_t> drive_telegrams_;
     std::optional<DriveAxis> axis_;
     DriveAxis::Outputs shown_;
     std::uint32_t speed_ = no_value;

@@ -38,14 +38,17 @@ class PinRow {
                   "the memory of an instance is only freed");
 
 public:
+    /// Returns the data of the pin, whose address does not change.
     template <class... Arguments>
-    void add(const Data& data, Arguments&&... of_pin) {
+    Data& add(const Data& data, Arguments&&... of_pin) {
         if (blocks_.empty() || blocks_.back().size == blocks_.back().capacity) {
             grow(blocks_.empty() ? 4 : 2 * blocks_.back().capacity);
         }
         Block& last = blocks_.back();
-        new (last.pins + last.size) Bound{Pin(std::forward<Arguments>(of_pin)...), data};
+        auto* const added =
+            new (last.pins + last.size) Bound{Pin(std::forward<Arguments>(of_pin)...), data};
         ++last.size;
+        return added->data;
     }
     template <class Action>
     void each(Action& action) const noexcept {
@@ -80,22 +83,21 @@ template <hal_dir direction, class Data>
 class AnyPins {
 public:
     /// Declares a pin in the constructor of the component. A pin without `function` belongs to all
-    /// functions of the instance. Throws when the host rejects the pin, when memory is exhausted,
-    /// and for HAL_TYPE_PORT. [setup]
-    void declare(Component& component, const Function* function, hal_type type,
-                 const std::string& name, const std::string& doc, const Data& data,
-                 const AnyPinOptions& options = {}) {
-        visit_type(type, [&]<class T>(std::type_identity<T>) {
+    /// functions of the instance. Returns its data, whose address does not change. Throws when the
+    /// host rejects the pin, when memory is exhausted, and for HAL_TYPE_PORT. [setup]
+    Data& declare(Component& component, const Function* function, hal_type type,
+                  const std::string& name, const std::string& doc, const Data& data,
+                  const AnyPinOptions& options = {}) {
+        return visit_type(type, [&]<class T>(std::type_identity<T>) -> Data& {
             PinOptions<T> own{.initial = value_as<T>(options.initial), .unit = options.unit};
             if (options.safe) {
                 own.safe = value_as<T>(*options.safe);
             }
             auto& row = std::get<Row<T>>(rows_);
             if (function != nullptr) {
-                row.add(data, component, *function, name.c_str(), doc.c_str(), own);
-            } else {
-                row.add(data, component, name.c_str(), doc.c_str(), own);
+                return row.add(data, component, *function, name.c_str(), doc.c_str(), own);
             }
+            return row.add(data, component, name.c_str(), doc.c_str(), own);
         });
     }
     /// Calls `action(pin, data)` for each pin, type by type, in the order of declaration within a
