@@ -7,7 +7,8 @@ import subprocess
 import sys
 import unittest
 
-from harness import HAL, TIMEOUT, Case, free_port, wait_until
+from harness import TIMEOUT, Case, free_port, wait_until
+from mesa_node import MesaNode
 from own_network import own_network
 
 CARD = """[card]
@@ -42,37 +43,12 @@ start
 """
 
 
-class MesaDriver(Case):
+class MesaDriver(MesaNode, Case):
     def setUp(self):
         super().setUp()
         self.write("card.mesa", CARD)
         self.host = f"127.0.0.1:{free_port()}"
         self.netlist = self.write("m.hal", NETLIST.format(host=self.host))
-
-    def node(self, *words):
-        log = open(self.folder / "node.log", "a")
-        self.addCleanup(log.close)
-        node = subprocess.Popen(
-            ["hal", "node", "mesa", "card.mesa", "--address", self.host, "--verbose", *words],
-            executable=str(HAL),
-            cwd=self.folder,
-            env=self.environment,
-            stdin=subprocess.DEVNULL,
-            stdout=log,
-            stderr=subprocess.STDOUT,
-        )
-        self.addCleanup(self.end_node, node)
-        wait_until(lambda: f"7i92 at {self.host}" in self.log(), "the card runs")
-        return node
-
-    def log(self):
-        return (self.folder / "node.log").read_text()
-
-    @staticmethod
-    def end_node(node):
-        node.send_signal(signal.SIGCONT)
-        node.terminate()
-        node.wait(timeout=TIMEOUT)
 
     def move(self, position):
         self.say("setp", "hm2_7i92.0.stepgen.00.position-cmd", position)
@@ -86,7 +62,7 @@ class MesaDriver(Case):
         wait_until(is_there, f"the axis stands at {position}")
 
     def test_a_card_that_stops_and_returns(self):
-        node = self.node()
+        node = self.node("--verbose")
         machine = self.start("run", self.netlist)
         self.comes("hm2_7i92.0.online", "TRUE")
         self.say("setp", "hm2_7i92.0.gpio.020.out", "TRUE")
@@ -100,20 +76,20 @@ class MesaDriver(Case):
         self.end(machine)
 
     def test_a_card_that_is_replaced(self):
-        node = self.node()
+        node = self.node("--verbose")
         machine = self.start("run", self.netlist)
         self.comes("hm2_7i92.0.online", "TRUE")
         node.kill()
         node.wait(timeout=TIMEOUT)
         self.comes("hm2_7i92.0.online", "FALSE")
-        self.node()
+        self.node("--verbose")
         self.comes("hm2_7i92.0.online", "TRUE")
         self.assertEqual("1", self.value("hm2_7i92.0.resets"))
         self.move("5")
         self.end(machine)
 
     def test_a_card_has_one_master(self):
-        self.node()
+        self.node("--verbose")
         machine = self.start("run", self.netlist)
         self.comes("hm2_7i92.0.online", "TRUE")
         error = self.bad("run", "--name", "second", self.netlist)
@@ -152,7 +128,7 @@ class MesaDriver(Case):
         )
 
     def test_outputs_are_off_when_the_machine_ends(self):
-        self.node()
+        self.node("--verbose")
         machine = self.start("run", self.netlist)
         self.comes("hm2_7i92.0.online", "TRUE")
         self.say("setp", "hm2_7i92.0.gpio.020.out", "TRUE")

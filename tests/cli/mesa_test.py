@@ -5,10 +5,10 @@
 import json
 import socket
 import struct
-import subprocess
 import unittest
 
-from harness import HAL, TIMEOUT, Case, free_port, wait_until
+from harness import TIMEOUT, Case, free_port, wait_until
+from mesa_node import MesaNode
 
 CARD = """[card]
 type = 7i92
@@ -27,35 +27,11 @@ terminal = gpio 18
 """
 
 
-class Mesa(Case):
+class Mesa(MesaNode, Case):
     def setUp(self):
         super().setUp()
         self.write("card.mesa", CARD)
         self.host = f"127.0.0.1:{free_port()}"
-
-    def node(self, *words):
-        log = open(self.folder / "node.log", "w")
-        self.addCleanup(log.close)
-        node = subprocess.Popen(
-            ["hal", "node", "mesa", "card.mesa", "--address", self.host, *words],
-            executable=str(HAL),
-            cwd=self.folder,
-            env=self.environment,
-            stdin=subprocess.DEVNULL,
-            stdout=log,
-            stderr=subprocess.STDOUT,
-        )
-        self.addCleanup(self.end_node, node)
-        wait_until(lambda: f"7i92 at {self.host}" in self.log(), "the card runs")
-        return node
-
-    def log(self):
-        return (self.folder / "node.log").read_text()
-
-    @staticmethod
-    def end_node(node):
-        node.terminate()
-        node.wait(timeout=TIMEOUT)
 
     def mesa(self, command, *words):
         return self.good("mesa", command, self.host, *words)

@@ -9,10 +9,12 @@
 #include "mesa/hostmot2/pin.hpp"
 #include "mesa/hostmot2/registers.hpp"
 #include "mesa/lbp16/spaces.hpp"
-#include "tests/unit/mesa/bytes_text.hpp"
+#include "tests/unit/bytes_text.hpp"
 
 namespace hal::mesa {
 namespace {
+
+using test::hex;
 
 constexpr std::uint32_t clock_hz = 100'000'000;
 constexpr std::array<std::uint8_t, 6> mac{0x02, 1, 2, 3, 4, 5};

@@ -9,10 +9,12 @@
 #include "mesa/hostmot2/pin.hpp"
 #include "mesa/hostmot2/registers.hpp"
 #include "mesa/hostmot2/smart_serial.hpp"
-#include "tests/unit/mesa/bytes_text.hpp"
+#include "tests/unit/bytes_text.hpp"
 
 namespace hal::mesa {
 namespace {
+
+using test::hex;
 
 constexpr std::uint32_t low = 100'000'000;
 constexpr std::uint32_t high = 200'000'000;

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include "mesa/lbp16/packet.hpp"
 #include "mesa/lbp16/spaces.hpp"
-#include "tests/unit/mesa/bytes_text.hpp"
+#include "tests/unit/bytes_text.hpp"
 
 namespace hal::mesa {
 namespace {
+
+using test::from_hex;
+using test::hex;
 
 std::string read_bytes(Space space, std::uint16_t address, Unit unit, std::size_t count) {
     Request request;

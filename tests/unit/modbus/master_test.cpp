@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "modbus/master/event_texts.hpp"
+#include "passing_line.hpp"
+#include "tests/unit/bytes_text.hpp"
 #include "world.hpp"
 
 namespace hal::modbus::test {
@@ -88,30 +90,16 @@ INSTANTIATE_TEST_SUITE_P(All, ProfileTest, testing::ValuesIn([] {
                          });
 
 /// Records what is sent.
-class RecordedLine final : public line::Line {
+class RecordedLine final : public PassingLine {
 public:
     RecordedLine(std::unique_ptr<line::Line> line, std::vector<std::string>& frames)
-        : line_(std::move(line)), frames_(frames) {}
-    const line::Description& description() const noexcept override { return line_->description(); }
-    bool is_open(std::int64_t now) noexcept override { return line_->is_open(now); }
+        : PassingLine(std::move(line)), frames_(frames) {}
     bool send(std::span<const std::uint8_t> bytes, std::int64_t now) noexcept override {
-        std::string text;
-        char part[4];
-        for (const std::uint8_t byte : bytes) {
-            std::snprintf(part, sizeof part, "%02X ", byte);
-            text += part;
-        }
-        text.pop_back();
-        frames_.push_back(text);
-        return line_->send(bytes, now);
+        frames_.push_back(hal::test::hex(bytes));
+        return PassingLine::send(bytes, now);
     }
-    std::size_t receive(std::span<std::uint8_t> bytes, std::int64_t now) noexcept override {
-        return line_->receive(bytes, now);
-    }
-    std::int64_t sent_until_ns() const noexcept override { return line_->sent_until_ns(); }
 
 private:
-    std::unique_ptr<line::Line> line_;
     std::vector<std::string>& frames_;
 };
 
@@ -208,17 +196,12 @@ TEST(Master, Late_answer_is_never_the_value_of_another_request) {
 }
 
 /// A line on which one answer comes late.
-class LateLine final : public line::Line {
+class LateLine final : public PassingLine {
 public:
-    explicit LateLine(std::unique_ptr<line::Line> line) : line_(std::move(line)) {}
-    const line::Description& description() const noexcept override { return line_->description(); }
-    bool is_open(std::int64_t now) noexcept override { return line_->is_open(now); }
-    bool send(std::span<const std::uint8_t> bytes, std::int64_t now) noexcept override {
-        return line_->send(bytes, now);
-    }
+    using PassingLine::PassingLine;
     std::size_t receive(std::span<std::uint8_t> bytes, std::int64_t now) noexcept override {
         std::array<std::uint8_t, 256> part;
-        const std::size_t received = line_->receive(part, now);
+        const std::size_t received = PassingLine::receive(part, now);
         held_.insert(held_.end(), part.begin(),
                      part.begin() + static_cast<std::ptrdiff_t>(received));
         if (now < until) return 0;
@@ -227,12 +210,10 @@ public:
         held_.erase(held_.begin(), held_.begin() + static_cast<std::ptrdiff_t>(count));
         return count;
     }
-    std::int64_t sent_until_ns() const noexcept override { return line_->sent_until_ns(); }
 
     std::int64_t until = 0;  // nothing arrives
 
 private:
-    std::unique_ptr<line::Line> line_;
     std::vector<std::uint8_t> held_;
 };
 
@@ -279,22 +260,13 @@ TEST(Master, Answer_later_than_two_timeouts_is_never_the_value_of_another_reques
 }
 
 /// A slave that does not answer a request for more than one register.
-class IgnoringLine final : public line::Line {
+class IgnoringLine final : public PassingLine {
 public:
-    explicit IgnoringLine(std::unique_ptr<line::Line> line) : line_(std::move(line)) {}
-    const line::Description& description() const noexcept override { return line_->description(); }
-    bool is_open(std::int64_t now) noexcept override { return line_->is_open(now); }
+    using PassingLine::PassingLine;
     bool send(std::span<const std::uint8_t> bytes, std::int64_t now) noexcept override {
         if (bytes[1] == 3 && bytes[5] > 1) return true;
-        return line_->send(bytes, now);
+        return PassingLine::send(bytes, now);
     }
-    std::size_t receive(std::span<std::uint8_t> bytes, std::int64_t now) noexcept override {
-        return line_->receive(bytes, now);
-    }
-    std::int64_t sent_until_ns() const noexcept override { return line_->sent_until_ns(); }
-
-private:
-    std::unique_ptr<line::Line> line_;
 };
 
 TEST(Master, Slave_that_ignores_unknown_registers_stays_online_after_a_timeout) {
@@ -494,25 +466,19 @@ TEST_F(Stop, Is_not_repeated_to_a_slave_that_returns_later) {
 }
 
 /// A line that is lost, or is open and accepts no bytes.
-class FailingLine final : public line::Line {
+class FailingLine final : public PassingLine {
 public:
     enum class State : std::uint8_t { good, accepts_nothing, lost };
     FailingLine(std::unique_ptr<line::Line> line, const State& state)
-        : line_(std::move(line)), state_(state) {}
-    const line::Description& description() const noexcept override { return line_->description(); }
+        : PassingLine(std::move(line)), state_(state) {}
     bool is_open(std::int64_t now) noexcept override {
-        return state_ != State::lost && line_->is_open(now);
+        return state_ != State::lost && PassingLine::is_open(now);
     }
     bool send(std::span<const std::uint8_t> bytes, std::int64_t now) noexcept override {
-        return state_ == State::good && line_->send(bytes, now);
+        return state_ == State::good && PassingLine::send(bytes, now);
     }
-    std::size_t receive(std::span<std::uint8_t> bytes, std::int64_t now) noexcept override {
-        return line_->receive(bytes, now);
-    }
-    std::int64_t sent_until_ns() const noexcept override { return line_->sent_until_ns(); }
 
 private:
-    std::unique_ptr<line::Line> line_;
     const State& state_;
 };
 
@@ -534,15 +500,6 @@ struct BroadcastStop : testing::Test {
     }
     std::ptrdiff_t sent(const std::string& frame) const {
         return std::count(frames.begin(), frames.end(), frame);
-    }
-    /// Returns the lines of all events since the last call.
-    std::vector<std::string> lines() const {
-        const EventTexts texts(w.bus(), w.plan());
-        std::vector<std::string> all;
-        for (EventRecord record; w.image.pop(record);) {
-            all.push_back(texts.line(record));
-        }
-        return all;
     }
 
     static constexpr const char* broadcast = "00 06 00 32 00 07 68 16";
@@ -617,17 +574,18 @@ TEST_F(BroadcastStop, Is_sent_once_more_by_each_further_stop) {
 
 TEST_F(BroadcastStop, Is_sent_again_and_not_reported_until_the_line_accepts_it) {
     start();
-    lines();
+    w.lines();
     state = FailingLine::State::accepts_nothing;
     stop();
     w.run(200 * ms);
     EXPECT_EQ(w.image.header().broadcasts.load(), 0U);
-    EXPECT_EQ(lines(), std::vector<std::string>{"sends the stop telegrams: the pin estop is TRUE"});
+    EXPECT_EQ(w.lines(),
+              std::vector<std::string>{"sends the stop telegrams: the pin estop is TRUE"});
     state = FailingLine::State::good;
     w.run(second);
     EXPECT_EQ(sent(broadcast), 2);
     EXPECT_EQ(w.image.header().broadcasts.load(), 2U);
-    EXPECT_EQ(lines(),
+    EXPECT_EQ(w.lines(),
               (std::vector<std::string>{
                   "the broadcast stop was sent after 202.1 ms; no slave acknowledges a broadcast",
                   "slave 2 (b) acknowledged its stop telegrams after 308.1 ms"}));
@@ -635,13 +593,13 @@ TEST_F(BroadcastStop, Is_sent_again_and_not_reported_until_the_line_accepts_it) 
 
 TEST_F(BroadcastStop, Is_reported_when_it_is_sent_only_after_the_line_has_returned) {
     start();
-    lines();
+    w.lines();
     state = FailingLine::State::lost;
     stop();
     w.run(2 * second);
     EXPECT_EQ(w.image.header().phase.load(), static_cast<std::uint32_t>(Phase::stopped));
     EXPECT_EQ(w.image.header().broadcasts.load(), 0U);
-    EXPECT_EQ(lines(),
+    EXPECT_EQ(w.lines(),
               (std::vector<std::string>{
                   "sends the stop telegrams: the pin estop is TRUE",
                   "sim:x is lost; it is opened again as soon as possible",
@@ -650,7 +608,7 @@ TEST_F(BroadcastStop, Is_reported_when_it_is_sent_only_after_the_line_has_return
     w.run(second);
     EXPECT_EQ(sent(broadcast), 1);
     EXPECT_EQ(w.image.header().broadcasts.load(), 1U);
-    EXPECT_EQ(lines(),
+    EXPECT_EQ(w.lines(),
               (std::vector<std::string>{
                   "sim:x is open again",
                   "the broadcast stop was sent after 2002.1 ms; no slave acknowledges a broadcast",
@@ -660,7 +618,7 @@ TEST_F(BroadcastStop, Is_reported_when_it_is_sent_only_after_the_line_has_return
 
 TEST_F(BroadcastStop, Ends_on_a_line_that_accepts_nothing) {
     start();
-    lines();
+    w.lines();
     state = FailingLine::State::accepts_nothing;
     stop();
     w.run(4 * second);
@@ -864,26 +822,22 @@ TEST_F(Stop, A_request_that_is_rejected_once_is_repeated_and_not_a_fault) {
 }
 
 /// A two-wire adapter without receiver disable: what is sent is also received.
-class EchoLine final : public line::Line {
+class EchoLine final : public PassingLine {
 public:
-    explicit EchoLine(std::unique_ptr<line::Line> line) : line_(std::move(line)) {}
-    const line::Description& description() const noexcept override { return line_->description(); }
-    bool is_open(std::int64_t now) noexcept override { return line_->is_open(now); }
+    using PassingLine::PassingLine;
     bool send(std::span<const std::uint8_t> bytes, std::int64_t now) noexcept override {
         echo_.insert(echo_.end(), bytes.begin(), bytes.end());
-        return line_->send(bytes, now);
+        return PassingLine::send(bytes, now);
     }
     std::size_t receive(std::span<std::uint8_t> bytes, std::int64_t now) noexcept override {
-        if (now < line_->sent_until_ns()) return 0;
+        if (now < PassingLine::sent_until_ns()) return 0;
         const std::size_t count = std::min(bytes.size(), echo_.size());
         std::copy_n(echo_.begin(), count, bytes.begin());
         echo_.erase(echo_.begin(), echo_.begin() + static_cast<std::ptrdiff_t>(count));
-        return count != 0 ? count : line_->receive(bytes, now);
+        return count != 0 ? count : PassingLine::receive(bytes, now);
     }
-    std::int64_t sent_until_ns() const noexcept override { return line_->sent_until_ns(); }
 
 private:
-    std::unique_ptr<line::Line> line_;
     std::vector<std::uint8_t> echo_;
 };
 

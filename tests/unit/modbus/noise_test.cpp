@@ -4,7 +4,7 @@
 #include <cstdlib>
 #include <deque>
 
-#include "modbus/master/event_texts.hpp"
+#include "passing_line.hpp"
 #include "world.hpp"
 
 namespace hal::modbus::test {
@@ -83,17 +83,15 @@ TEST(Noise, No_wrong_value_is_accepted_while_a_tenth_of_the_bytes_is_wrong) {
 }
 
 /// A line on which each 20th answer has another value and a valid check sequence.
-class ForgingLine final : public line::Line {
+class ForgingLine final : public PassingLine {
 public:
-    explicit ForgingLine(std::unique_ptr<line::Line> line) : line_(std::move(line)) {}
-    const line::Description& description() const noexcept override { return line_->description(); }
-    bool is_open(std::int64_t now) noexcept override { return line_->is_open(now); }
+    using PassingLine::PassingLine;
     bool send(std::span<const std::uint8_t> bytes, std::int64_t now) noexcept override {
         received_ = 0;
-        return line_->send(bytes, now);
+        return PassingLine::send(bytes, now);
     }
     std::size_t receive(std::span<std::uint8_t> bytes, std::int64_t now) noexcept override {
-        const std::size_t count = line_->receive(bytes, now);
+        const std::size_t count = PassingLine::receive(bytes, now);
         if (count != 0 && received_ == 0) {
             ++answers_;
         }
@@ -105,13 +103,11 @@ public:
         received_ += count;
         return count;
     }
-    std::int64_t sent_until_ns() const noexcept override { return line_->sent_until_ns(); }
 
     /// The value 999 in the answer of slave 1 to a read of a register.
     static constexpr std::array<std::uint8_t, 7> forged = {1, 3, 2, 3, 0xe7, 0xf8, 0xfe};
 
 private:
-    std::unique_ptr<line::Line> line_;
     std::size_t received_ = 0;  // bytes since the last request
     std::uint64_t answers_ = 0;
 };
@@ -173,14 +169,6 @@ struct ChangingValue : testing::Test {
     std::int64_t age(const std::string& name) const {
         return w.now - w.image.value_stamp(w.value(name)).load();
     }
-    std::vector<std::string> lines() const {
-        const EventTexts texts(w.bus(), w.plan());
-        std::vector<std::string> all;
-        for (EventRecord record; w.image.pop(record);) {
-            all.push_back(texts.line(record));
-        }
-        return all;
-    }
     double angle = 0.0;
     World w;
 };
@@ -195,12 +183,13 @@ TEST_F(ChangingValue, Waits_alone_and_is_a_fault_until_it_is_accepted) {
     EXPECT_LT(age("on"), 20 * ms);
     EXPECT_EQ(w.image.value_stamp(w.value("angle")).load(), 0) << "never accepted";
     EXPECT_EQ(w.image.stamp(0).load(), 0) << "that of the oldest value";
-    EXPECT_EQ(lines(), std::vector<std::string>{"slave 1 (s) is online"});
+    EXPECT_EQ(w.lines(), std::vector<std::string>{"slave 1 (s) is online"});
 
     run(second, true);
-    EXPECT_EQ(lines(), std::vector<std::string>{
-                           "slave 1 (s): a value that changes between all answers is not accepted: "
-                           "angle; write confirm = errors for this slave; see test.modbus:8"});
+    EXPECT_EQ(w.lines(),
+              std::vector<std::string>{
+                  "slave 1 (s): a value that changes between all answers is not accepted: "
+                  "angle; write confirm = errors for this slave; see test.modbus:8"});
     w.slaves->slaves()[0].set("limit", 8);
     run(50 * ms, true);
     EXPECT_EQ(w.number("limit"), 8U);
@@ -209,7 +198,7 @@ TEST_F(ChangingValue, Waits_alone_and_is_a_fault_until_it_is_accepted) {
     EXPECT_EQ(w.real("angle"), angle);
     EXPECT_LT(age("angle"), 20 * ms);
     EXPECT_EQ(w.image.stamp(0).load(), w.image.value_stamp(w.value("angle")).load());
-    EXPECT_EQ(lines(), std::vector<std::string>{"slave 1 (s): all values are accepted again"});
+    EXPECT_EQ(w.lines(), std::vector<std::string>{"slave 1 (s): all values are accepted again"});
 }
 
 struct DisturbedChangingValue : ChangingValue {
@@ -222,14 +211,14 @@ TEST_F(DisturbedChangingValue, Is_accepted_again_when_the_line_is_repaired) {
     fault.every = 9;
     w.slaves->faults().push_back(fault);
     run(2 * second, true);
-    std::vector<std::string> all = lines();
+    std::vector<std::string> all = w.lines();
     EXPECT_EQ(
         all.back(),
         "slave 1 (s): a value that changes between all answers is not accepted: angle; repair "
         "the line, or write confirm = no for this slave; see test.modbus:8");
     w.slaves->faults().clear();
     run(4 * second, true);
-    EXPECT_EQ(lines(), std::vector<std::string>{"slave 1 (s): all values are accepted again"});
+    EXPECT_EQ(w.lines(), std::vector<std::string>{"slave 1 (s): all values are accepted again"});
     EXPECT_LT(age("angle"), 20 * ms);
 }
 

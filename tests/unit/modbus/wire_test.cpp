@@ -2,22 +2,13 @@
 #include "modbus/wire/frame.hpp"
 
 #include "modbus/master/value_codec.hpp"
+#include "tests/unit/bytes_text.hpp"
 
 namespace hal::modbus {
 namespace {
 
-std::string hex(std::span<const std::uint8_t> bytes) {
-    std::string text;
-    char part[4];
-    for (const std::uint8_t byte : bytes) {
-        std::snprintf(part, sizeof part, "%02X ", byte);
-        text += part;
-    }
-    if (!text.empty()) {
-        text.pop_back();
-    }
-    return text;
-}
+using test::hex;
+
 std::string rtu(std::uint8_t unit, const Pdu& pdu) {
     return hex(encode(Framing::rtu, unit, 0, pdu).span());
 }

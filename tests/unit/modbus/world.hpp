@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "modbus/device/slave_bus.hpp"
+#include "modbus/master/event_texts.hpp"
 #include "modbus/master/local_master.hpp"
 
 namespace hal::modbus::test {
@@ -74,6 +75,16 @@ public:
     }
     std::uint64_t number(const std::string& name, std::uint8_t unit = 1) const {
         return image.value(value(name, unit)).load();
+    }
+
+    /// Returns the lines of all events since the last call.
+    std::vector<std::string> lines() const {
+        const EventTexts texts(config_.bus, plan_);
+        std::vector<std::string> all;
+        for (EventRecord record; image.pop(record);) {
+            all.push_back(texts.line(record));
+        }
+        return all;
     }
 
     std::int64_t now = second;

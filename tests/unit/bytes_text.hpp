@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-namespace hal::mesa {
+namespace hal::test {
 
 inline std::string hex(std::span<const std::uint8_t> bytes) {
     std::string text;
@@ -31,4 +31,4 @@ inline std::vector<std::uint8_t> from_hex(const std::string& text) {
     return bytes;
 }
 
-}  // namespace hal::mesa
+}  // namespace hal::test
