@@ -405,6 +405,14 @@ getp follow.position
 
     # --- what goes wrong -------------------------------------------------------------------------------------------------
 
+    def test_a_component_that_only_linuxcnc_has_names_what_takes_its_place(self):
+        self.environment["HAL_RTMOD_DIR"] = "/nowhere"
+        failed = self.error("loadrt laserpower\n")
+        self.assertIn(
+            "component 'laserpower' is one of LinuxCNC's that Halcyon does not have", failed
+        )
+        self.assertIn("= help: use mult2 and limit1, or compile LinuxCNC's", failed)
+
     def test_a_missing_folder_names_the_package(self):
         self.environment["HAL_RTMOD_DIR"] = "/nowhere"
         self.assertEqual(

@@ -221,11 +221,33 @@ std::optional<Plugin> Plugins::open(std::string_view name, Span at,
     return open_component(*this, name, Origin::any, at, diagnostics);
 }
 
+/// Returns what to use for a component of LinuxCNC's catalogue that is missing in ours; "" for any
+/// other name.
+static std::string_view replacement_of(std::string_view name) {
+    struct Missing {
+        std::string_view name, help;
+    };
+    static constexpr Missing all[] = {
+        {"laserpower", "use mult2 and limit1, or compile LinuxCNC's: hal compile laserpower.comp"},
+        {"led_dim", "use limit1 and pwmgen, or compile LinuxCNC's: hal compile led_dim.comp"},
+        {"plasmac", "for height control alone, use thc, thcud or ohmic"},
+    };
+    const auto* const found = std::ranges::find(all, name, &Missing::name);
+    return found == std::end(all) ? "" : found->help;
+}
+
 /// Reports that no component has this name, with the reason or a similar name.
 static void report_unknown(const Plugins& plugins, std::string_view name, Origin origin, Span at,
                            Diagnostics& diagnostics) {
     const std::string why = left_out_for(underlined(name), plugins.path());
     if (!why.empty()) return report_left_out(name, why, at, diagnostics);
+    if (const std::string_view help = replacement_of(underlined(name)); !help.empty()) {
+        diagnostics.error(
+            "no-such-component", at,
+            "component '" + std::string(name) + "' is one of LinuxCNC's that Halcyon does not have",
+            "", std::string(help));
+        return;
+    }
     const std::string similar = did_you_mean(name, plugins.available());
     std::error_code none;
     const bool may_be_linuxcncs =
