@@ -531,6 +531,14 @@ getp follow.position
         self.assertNotIn("never printed", done.stderr)
         self.assertTrue(done.stdout.endswith("2\n"), done.stdout)
 
+    def test_a_failed_driver_of_mesa_cards_names_the_one_of_halcyon(self):
+        self.build("hm2_eth", source="troubled")
+        failed = self.error("loadrt hm2_eth fault=fail\n")
+        self.assertIn("component 'hm2_eth' cannot make 'hm2-eth': troubled: no card", failed)
+        self.assertIn("= help: Halcyon has a driver of its own: loadrt --native hm2_eth\n", failed)
+        self.build("troubled")
+        self.assertNotIn("a driver of its own", self.error("loadrt troubled fault=fail\n"))
+
     @unittest.skipIf(harness.SANITIZED, "the sanitizer takes crash signals")
     def test_a_crash_in_main_is_an_error_and_the_machine_goes_on(self):
         self.build("troubled", "gain")

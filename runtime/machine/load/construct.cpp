@@ -90,6 +90,14 @@ Span span_of(const GivenArgument& given, const Failure& why, const Sources& sour
     return {given.at.source, first + why.begin, first + why.end};
 }
 
+/// What to type when a module of LinuxCNC cannot be loaded for which there is a driver of ours; "":
+/// nothing.
+std::string own_driver(const LoadedComponent& component) {
+    const bool is_module = (component.plugin->flags & HAL_COMPONENT_MODULE) != 0;
+    if (!is_module || component.name != "hm2_eth") return "";
+    return "Halcyon has a driver of its own: loadrt --native hm2_eth";
+}
+
 /// Reports why a constructor failed, at the argument that it rejects if there is one.
 void report_failure(const LoadedComponent& component, const LoadRequest& request,
                     const Sources& sources, const Construction& c, Diagnostics& diagnostics) {
@@ -107,7 +115,7 @@ void report_failure(const LoadedComponent& component, const LoadRequest& request
     diagnostics.error(failure_code(why.code, "construct-failed"), request.at,
                       "component '" + component.name + "' cannot make '" + c.instance.name +
                           "': " + (why.empty() ? "it gave no reason" : why.text),
-                      "", why.help);
+                      "", why.help.empty() ? own_driver(component) : why.help);
 }
 
 /// Notes which of the arguments the constructor declares as lists or as the number of instances.
