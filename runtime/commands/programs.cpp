@@ -330,14 +330,28 @@ std::string progress(Context& context, const Plan& plan, pid_t pid) {
            " instead";
 }
 
+/// "was terminated by signal 9" or "VERB exit status 1".
+std::string end_text(int status, const std::string& verb) {
+    return status > 128 ? "was terminated by signal " + std::to_string(status - 128)
+                        : verb + " exit status " + std::to_string(status);
+}
+
+/// What to do about a program that has ended and had not tried to register. `status`: none when it
+/// is not known.
+std::string advice_for_silent(std::optional<int> status) {
+    if (status == 0) return "a program registers over the control socket; omit -W if it does not";
+    return (status ? "it " + end_text(*status, "ended with") + "; see" : "see") +
+           " its messages, which are in the output of the machine";
+}
+
 /// Reports that the program has ended before its component was ready. `last`: what it had done.
-void report_ended_early(Context& context, const Plan& plan, bool registered,
+void report_ended_early(Context& context, const Plan& plan, pid_t pid, bool registered,
                         const std::string& last) {
     std::string why = "it " + last;
     if (registered) {
         why = "it registered the component and ended while it was initializing";
     } else if (last == nothing_registered) {
-        why = "a program registers over the control socket; omit -W if it does not";
+        why = advice_for_silent(context.programs.ended_with(pid));
     }
     context.diagnostics.error("program-ended", context.span(plan.program),
                               "'" + context.argument(plan.program) +
@@ -366,7 +380,7 @@ void wait_until_ready(Context& context, const Plan& plan, pid_t pid, std::uint64
         if (named && named->ready()) return;
         if (!child && !(entry && may_return(*entry))) {
             const bool is_lost = fresh && entry && entry->dead();
-            report_ended_early(context, plan, last == initializing || is_lost, last);
+            report_ended_early(context, plan, pid, last == initializing || is_lost, last);
             if (is_lost) {
                 context.programs.give_up(*entry);
             }
@@ -431,9 +445,7 @@ void wait_until_ended(Context& context, const Plan& plan, pid_t pid, Pipes* pipe
         pipes->pass_on(context.output, 0);
     }
     if (status == 0 || plan.ignore_status) return;
-    const std::string how = status > 128
-                                ? "was terminated by signal " + std::to_string(status - 128)
-                                : "failed with exit status " + std::to_string(status);
+    const std::string how = end_text(status, "failed with");
     context.diagnostics.error("program-failed", context.span(plan.program),
                               "'" + context.argument(plan.program) + "' " + how, "",
                               "-i before the name of the program ignores the status");

@@ -364,7 +364,7 @@ class Linuxcnc(LinuxcncCase):
 CONFIG/machine.ini [EMCIO]EMCIO:1:23: error: 'io' ended before a component 'iocontrol' was ready [program-ended]
     1 | loadusr -Wn iocontrol io -ini CONFIG/machine.ini
       |                       ^^
-      = help: a program registers over the control socket; omit -W if it does not
+      = help: it ended with exit status 4; see its messages, which are in the output of the machine
 """,
             self.linuxcnc(self.ini(), status=1)[1],
         )
@@ -374,7 +374,7 @@ CONFIG/machine.ini [EMCIO]EMCIO:1:23: error: 'io' ended before a component 'ioco
 CONFIG/machine.ini [TASK]TASK:1:20: error: 'milltask' ended before a component 'inihal' was ready [program-ended]
     1 | loadusr -Wn inihal milltask -ini CONFIG/machine.ini
       |                    ^^^^^^^^
-      = help: a program registers over the control socket; omit -W if it does not
+      = help: it ended with exit status 4; see its messages, which are in the output of the machine
 """,
             self.linuxcnc(self.ini(), status=1)[1],
         )

@@ -217,6 +217,16 @@ os._exit(3)
         self.assertEqual(0, self.shell("loadusr", "-Wn", "uc", *self.slow("uc")).returncode)
         self.assertEqual("ready", self.state("uc"))
 
+    def test_one_that_ends_unregistered_names_its_messages_unless_all_was_well(self):
+        self.machine()
+        for script, help in (
+            ("exit 3", "it ended with exit status 3; see its messages, which are in the output"),
+            ("kill -9 $$", "it was terminated by signal 9; see its messages, which are in"),
+            ("exit 0", "a program registers over the control socket; omit -W if it does not\n"),
+        ):
+            said = self.refused("loadusr", "-W", "sh", "-c", script)
+            self.assertIn(f"= help: {help}", said)
+
     def test_waiting_for_a_wrong_name_reports_and_ends(self):
         self.machine()
         waiter = self.background(str(HAL), "shell", "loadusr", "-Wn", "wrong", *self.slow("right"))

@@ -163,6 +163,11 @@ std::string Programs::refusal_of(pid_t pid) const {
     return at == refusals_.end() ? "" : at->second;
 }
 
+std::optional<int> Programs::ended_with(pid_t pid) const {
+    const auto at = std::ranges::find(last_ends_, pid, &std::pair<pid_t, int>::first);
+    return at == last_ends_.end() ? std::nullopt : std::optional(at->second);
+}
+
 std::vector<std::string> Programs::registered_by(pid_t pid) const {
     std::vector<std::string> all;
     for (const Entry& entry : entries_) {
@@ -414,6 +419,10 @@ void Programs::die(Entry& entry, const std::string& how) {
 }
 
 void Programs::child_ended(pid_t pid, int status) {
+    last_ends_.emplace_front(pid, status);
+    if (last_ends_.size() > max_last_ends) {
+        last_ends_.pop_back();
+    }
     for (std::size_t i = entries_.size(); i-- > 0;) {
         Entry& entry = entries_[i];
         if (entry.pid != pid) continue;

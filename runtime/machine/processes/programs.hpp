@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <deque>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -90,6 +91,8 @@ public:
     /// Returns why the last registration of a child was rejected, also of one that has ended since;
     /// "" when none was.
     std::string refusal_of(pid_t pid) const;
+    /// Returns the status of a child that has ended lately: exit status, or 128 + signal.
+    std::optional<int> ended_with(pid_t pid) const;
     std::vector<std::string> names() const;
     bool idle() const { return entries_.empty(); }  ///< no program is known
     /// Returns true while the process is a child whose exit status is still to come.
@@ -164,6 +167,8 @@ private:
     std::uint64_t numbers_ = 0;
     std::deque<std::pair<pid_t, std::string>> refusals_;  // the newest first
     static constexpr std::size_t max_refusals = 16;
+    std::deque<std::pair<pid_t, int>> last_ends_;  // of children, with status; the newest first
+    static constexpr std::size_t max_last_ends = 64;
     std::deque<std::string> known_names_;  // the newest first
     static constexpr std::size_t max_known_names = 256;
     bool ending_children_ = false;  // nothing is started again
