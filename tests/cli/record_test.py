@@ -46,6 +46,13 @@ class Sim(Case):
             ),
         )
 
+    def test_a_pattern_without_a_file_says_what_to_type(self):
+        self.assertEqual(
+            "hal record: 'x-*' names values, not a file; name the file first: hal record "
+            "FILE.mcap 'x-*'\n",
+            self.bad("record", "x-*"),
+        )
+
     def test_lines_have_a_blank_after_each_value(self):
         self.write("in.txt", "1 1\n")
         self.assertRegex(

@@ -153,6 +153,10 @@ int follow(Stream& stream, const RecordOptions& options, RecordFile& file) {
     return file.close() ? 0 : lost();
 }
 
+bool has_wildcard(const std::string& word) {
+    return word.find_first_of("*?[") != std::string::npos;
+}
+
 }  // namespace
 
 int run_record(const RecordOptions& options) {
@@ -171,6 +175,11 @@ int run_record(const RecordOptions& options) {
         what.file = words[0];
         what.names.assign(words.begin() + 1, words.end());
         return record_values(options, instance_wanted(options.name), std::move(what));
+    }
+    if (!options.classic && words.size() == 1 && has_wildcard(words[0])) {
+        return fail(options, fmt::format("'{0}' names values, not a file; name the file first: hal "
+                                         "record FILE.mcap '{0}'",
+                                         words[0]));
     }
     Stream stream;
     if (!stream.open(options, "sampler")) return 1;
