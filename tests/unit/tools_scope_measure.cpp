@@ -2,6 +2,7 @@
 #include <cmath>
 #include <gtest/gtest.h>
 #include <numbers>
+#include <optional>
 #include <random>
 
 #include "tools/scope/measure.hpp"
@@ -20,7 +21,7 @@ Samples sampled(int from_ms, int to_ms, F f) {
     return samples;
 }
 
-Measurements measure_all(const Samples& samples, std::int64_t step_ns = 0) {
+Measurements measure_all(const Samples& samples, std::optional<std::int64_t> step_ns = 0) {
     return measure(samples, samples.front().time_ns, samples.back().time_ns, step_ns);
 }
 
@@ -82,6 +83,18 @@ TEST(Measure, what_has_not_settled_within_the_window_is_unknown) {
         measure_all(sampled(-100, 100, [](double t) { return step_response(t, 0.05, 10 * pi); }));
     EXPECT_FALSE(found.overshoot_percent);
     EXPECT_FALSE(found.settling_s);
+}
+
+TEST(Measure, nothing_that_is_no_step_has_the_figures_of_one) {
+    const auto step = sampled(-100, 100, [](double t) { return t < 0 ? 0.0 : 1.0; });
+    EXPECT_TRUE(measure_all(step).overshoot_percent);
+    EXPECT_FALSE(measure_all(step, std::nullopt).overshoot_percent) << "no trigger";
+    EXPECT_FALSE(measure_all(step, std::nullopt).settling_s) << "no trigger";
+    // noise that is still at the end of the window
+    const auto noise = sampled(
+        -100, 100, [](double t) { return t < 0.05 ? 0.5 * std::sin(1.0 + t * 7000.0) : 0.25; });
+    EXPECT_FALSE(measure_all(noise).overshoot_percent);
+    EXPECT_FALSE(measure_all(noise).settling_s);
 }
 
 TEST(Measure, too_few_samples_on_an_edge_give_no_rise_time) {

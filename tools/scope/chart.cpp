@@ -123,7 +123,7 @@ private:
     void lane(std::size_t i) {
         const Channel& channel = channels_[i];
         const Measurements found =
-            measure(record_.samples[i], record_.begin_ns, record_.end_ns, record_.trigger_ns);
+            measure(record_.samples[i], record_.begin_ns, record_.end_ns, record_.step_ns());
         const double height = channel.bit ? bit_height : float_height;
         const char* const colour = colours[i % std::size(colours)];
         y_ += gap;
@@ -307,7 +307,7 @@ std::string measurement_table(const std::vector<Channel>& channels, const Record
     for (std::size_t i = 0; i < channels.size(); ++i) {
         const std::string& unit = channels[i].unit;
         const Measurements found =
-            measure(record.samples[i], record.begin_ns, record.end_ns, record.trigger_ns);
+            measure(record.samples[i], record.begin_ns, record.end_ns, record.step_ns());
         text += fmt::format(
             "{:<24} {:>8} {:>12} {:>12} {:>12} {:>12} {:>12} {:>11} {:>11}\n", channels[i].name,
             found.count, format_measured(found.min, unit), format_measured(found.max, unit),

@@ -18,6 +18,7 @@ namespace {
 using View = std::span<const Sample>;
 
 constexpr double band = 0.02;  // of the step: settled
+constexpr double min_over_noise = 3;  // height of a step over the deviation before it
 constexpr std::size_t min_before = 3;  // samples before a step
 constexpr std::size_t min_on_edge = 5;  // samples on a rising edge
 constexpr double crossing_hysteresis = 0.2;  // of the range
@@ -28,6 +29,16 @@ double mean_of(View samples) {
         sum += sample.value;
     }
     return sum / static_cast<double>(samples.size());
+}
+
+/// Returns the standard deviation.
+double noise_of(View samples) {
+    const double mean = mean_of(samples);
+    double squares = 0;
+    for (const Sample& sample : samples) {
+        squares += (sample.value - mean) * (sample.value - mean);
+    }
+    return std::sqrt(squares / static_cast<double>(samples.size()));
 }
 
 double crossing_ns(const Sample& before, const Sample& after, double level) {
@@ -69,7 +80,7 @@ Periods periods_of(View samples, double min, double max) {
 
 /// Measures the response to a step at `step_ns`: settling time, overshoot, and rise time from 10 to
 /// 90 % between the means before the step and of the last tenth of the samples. Sets nothing for a
-/// step below 5 % of `range`, or a response that does not settle.
+/// step below 5 % of `range` or within the noise before it, or a response that does not settle.
 void measure_step(View samples, std::int64_t step_ns, double range, Measurements& to) {
     const auto before =
         static_cast<std::size_t>(std::lower_bound(samples.begin(), samples.end(), step_ns,
@@ -83,6 +94,7 @@ void measure_step(View samples, std::int64_t step_ns, double range, Measurements
 
     const double step = last - first;
     if (!(std::abs(step) > 0.05 * range)) return;
+    if (std::abs(step) < min_over_noise * noise_of(samples.first(before))) return;
     to.initial = first;
     to.final = last;
     const View after = samples.subspan(before);
@@ -126,7 +138,7 @@ void measure_step(View samples, std::int64_t step_ns, double range, Measurements
 }  // namespace
 
 Measurements measure(const Samples& samples, std::int64_t begin_ns, std::int64_t end_ns,
-                     std::int64_t step_ns) {
+                     std::optional<std::int64_t> step_ns) {
     Measurements to;
     const auto earlier = [](const Sample& sample, std::int64_t t) { return sample.time_ns < t; };
     const auto from = std::lower_bound(samples.begin(), samples.end(), begin_ns, earlier);
@@ -163,7 +175,9 @@ Measurements measure(const Samples& samples, std::int64_t begin_ns, std::int64_t
     }
     to.rms = std::sqrt(squares / static_cast<double>(whole.size()));
     to.ac_rms = std::sqrt(deviations / static_cast<double>(whole.size()));
-    measure_step(view, step_ns, *to.max - *to.min, to);
+    if (step_ns) {
+        measure_step(view, *step_ns, *to.max - *to.min, to);
+    }
     return to;
 }
 

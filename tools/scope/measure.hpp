@@ -28,9 +28,9 @@ struct Measurements {
 };
 
 /// Measures between begin_ns and end_ns, both included. `step_ns`: the time of the step that a step
-/// response is measured from, which is the trigger's.
+/// response is measured from, which is the trigger's; none: no step response.
 Measurements measure(const Samples& samples, std::int64_t begin_ns, std::int64_t end_ns,
-                     std::int64_t step_ns);
+                     std::optional<std::int64_t> step_ns);
 
 /// Returns the value that holds at `time_ns`: linear between samples, or of the sample before when
 /// `stepped`; no value before the first sample.

@@ -125,7 +125,7 @@ std::string ScopePicture::channel_line(const Record& record, std::size_t channel
         begin_ns = record.trigger_ns + from;
         end_ns = record.trigger_ns + to;
     }
-    const Measurements found = measure(samples, begin_ns, end_ns, record.trigger_ns);
+    const Measurements found = measure(samples, begin_ns, end_ns, record.step_ns());
     text +=
         fmt::format("min {}  max {}  mean {}  rms {}", format_measured(found.min, about.unit),
                     format_measured(found.max, about.unit), format_measured(found.mean, about.unit),

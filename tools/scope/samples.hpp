@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -48,6 +49,11 @@ struct Record {
     std::int64_t end_ns = 0;
     std::int64_t trigger_ns = 0;   ///< interpolated between two samples; time 0 of a picture
     bool triggered = false;        ///< false: automatic, rolling or forced
+
+    /// Returns when the step began that a response is measured from; none without a trigger.
+    std::optional<std::int64_t> step_ns() const {
+        return triggered ? std::optional(trigger_ns) : std::nullopt;
+    }
 };
 
 }  // namespace hal::tools
