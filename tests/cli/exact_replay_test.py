@@ -662,12 +662,20 @@ start
         self.give(["setp siggen.0.amplitude 1.5"])
         self.wait_for_cycles(1500)
         self.finish(machine)
-        text = self.replay("--break", "sine > 1.4", "--show", "sine,effort", "--as-test", "case")
+        before = os.umask(0o002)
+        try:
+            text = self.replay(
+                "--break", "sine > 1.4", "--show", "sine,effort", "--as-test", "case"
+            )
+        finally:
+            os.umask(before)
         self.assertRegex(
             text, r"\ncase: \d+ cycles, 2 values expected; to run it, type: hal replay case\n"
         )
         case = self.folder / "case"
         self.assertLess((case / "journal.mcap").stat().st_size, 40_000)
+        modes = {path.name: path.stat().st_mode & 0o777 for path in case.iterdir()}
+        self.assertEqual(dict.fromkeys(("journal.mcap", "expected", "test.hal"), 0o664), modes)
         self.assertEqual(
             re.search(r"(?m)^sine .*\neffort .*\n", text)[0], (case / "expected").read_text()
         )
@@ -830,6 +838,19 @@ start
         )
         for words in (["--tolerance", "1"], ["--for", "1s"]):
             self.assertIn("compares all bits", self.bad("replay", "--exact", "run.mcap", *words))
+
+    def test_a_journal_without_exact_and_an_unfinished_one_say_what_to_type(self):
+        machine = self.run_journaled(MACHINE)
+        self.wait_for_cycles(10)
+        self.finish(machine)
+        said = self.bad("replay", "run.mcap")
+        self.assertIn(
+            "'run.mcap' is a journal; to execute it again, type: hal replay --exact run.mcap;", said
+        )
+        (self.folder / "run.mcap").rename(self.folder / "run.mcap.part")
+        said = self.bad("replay", "--exact", "run.mcap")
+        self.assertIn("; 'run.mcap.part' is there, of a machine that runs", said)
+        self.assertNotIn(".part", self.bad("replay", "--exact", "other.mcap"))
 
     def test_another_plugin_is_rejected(self):
         own = self.folder / "plugins"

@@ -290,6 +290,19 @@ std::string cut_problem(const ReplayOptions& options) {
     return problem.empty() ? "" : "the state of the machine cannot be written: " + problem;
 }
 
+/// Returns what to name in place of a missing file whose unfinished part is beside it; "": nothing.
+std::string unfinished_part(const std::string& path) {
+    std::error_code ignored;
+    const std::string part = path + ".part";
+    const bool is_beside =
+        !std::filesystem::exists(path, ignored) && std::filesystem::exists(part, ignored);
+    if (!is_beside) return "";
+    return fmt::format(
+        "; '{}' is there, of a machine that runs or did not end in good order: name "
+        "that one",
+        part);
+}
+
 }  // namespace
 
 int run_exact_replay(const ReplayOptions& options) {
@@ -334,8 +347,8 @@ int run_exact_replay(const ReplayOptions& options) {
     JournalFile file;
     const bool is_one = options.words.size() == 1;
     if (!(is_one ? file.open(options.words[0]) : file.open(options.words))) {
-        return fail(options,
-                    fmt::format("cannot execute '{}': {}", options.words[0], file.problem()));
+        return fail(options, fmt::format("cannot execute '{}': {}{}", options.words[0],
+                                         file.problem(), unfinished_part(options.words[0])));
     }
     for (const std::string& text : file.notes()) {
         note(options, text);

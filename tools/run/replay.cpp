@@ -16,6 +16,7 @@
 #include <utility>
 
 #include "cli/output.hpp"
+#include "journal/journal_file.hpp"
 #include "recording/mcap/playback_pin.hpp"
 #include "recording/mcap/recording.hpp"
 #include "run/chosen_values.hpp"
@@ -585,6 +586,20 @@ std::string exact_options(const ReplayOptions& options) {
     return list;
 }
 
+bool is_journal(const std::string& path) {
+    JournalFile file;
+    return file.open(path);
+}
+
+int report_missing_netlist(const ReplayOptions& options) {
+    const bool may_be_executed = options.words.size() == 1 && is_journal(options.words[0]);
+    if (!may_be_executed) return fail(options, "missing netlist: hal replay FILE NETLIST");
+    return fail(options, fmt::format("'{0}' is a journal; to execute it again, type: hal replay "
+                                     "--exact {0}; to run a netlist with its values, name one: hal "
+                                     "replay FILE NETLIST",
+                                     options.words[0]));
+}
+
 }  // namespace
 
 /// `hal replay`: runs a netlist with the inputs of a recording and compares the outputs; with
@@ -603,7 +618,7 @@ int run_replay(const ReplayOptions& options) {
     if (const std::string given = exact_options(options); !given.empty()) {
         return fail(options, fmt::format("only with --exact: {}", given));
     }
-    if (options.words.size() < 2) return fail(options, "missing netlist: hal replay FILE NETLIST");
+    if (options.words.size() < 2) return report_missing_netlist(options);
     const std::string file = std::filesystem::absolute(options.words.front()).string();
     mcap::Recording recording;
     std::string problem;
