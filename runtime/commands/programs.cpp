@@ -337,7 +337,7 @@ std::string end_text(int status, const std::string& verb) {
 }
 
 /// What to do about a program that has ended and had not tried to register. `status`: none when it
-/// is not known.
+/// is unknown.
 std::string advice_for_silent(std::optional<int> status) {
     if (status == 0) return "a program registers over the control socket; omit -W if it does not";
     return (status ? "it " + end_text(*status, "ended with") + "; see" : "see") +

@@ -132,7 +132,7 @@ int write_journal_test(const ReplayOptions& options, const JournalFile& file,
     }
     problem = write_file((folder / expected_name).string(), expected);
     if (!problem.empty()) return cannot(expected_name, problem);
-    // whoever may read the folder may run the test; a journal alone is for its owner and group
+    // every user who may read the folder may run the test; a journal alone is for owner and group
     fs::permissions(folder / journal_name, fs::status(folder / expected_name).permissions(), error);
     problem = write_file((folder / netlist_name).string(), netlist(file, progress.entries));
     if (!problem.empty()) return cannot(netlist_name, problem);
