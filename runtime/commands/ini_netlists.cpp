@@ -11,6 +11,7 @@
 #include "commands/script.hpp"
 #include "linuxcnc/find/modules.hpp"
 #include "machine/session.hpp"
+#include "text/quoting.hpp"
 
 namespace hal {
 
@@ -72,6 +73,23 @@ void note_programs(Session& session, const Ini& ini) {
     started(
         "DISPLAY", "DISPLAY", "",
         {"axisui", "pyvcp", "gladevcp", "qtvcp", "gmoccapy", display.substr(0, display.find(' '))});
+}
+
+/// The modules that `hal linuxcnc` loads before the netlists, where they are not LinuxCNC's own:
+/// what they have is unknown. A home module adds pins to the joints.
+void note_own_modules(Session& session, const Ini& ini) {
+    const auto note = [&](const char* section, const char* key, const std::string& usual) {
+        const std::string entry = ini.get(section, key).value_or(usual);
+        const std::string module = entry.substr(0, entry.find(' '));
+        if (module.empty() || module == usual) return std::optional<Absences::Cause>();
+        return std::optional(session.absences().add("module " + hal::quoted(module),
+                                                    "which is not loaded here", {},
+                                                    Absences::Scope::component));
+    };
+    note("TRAJ", "TPMOD", "tpmod");
+    if (const auto homing = note("EMCMOT", "HOMEMOD", "homemod")) {
+        session.absences().note("joint", homing);
+    }
 }
 
 std::vector<std::string> split_entry(const std::string& line) {
@@ -241,6 +259,7 @@ int IniNetlists::run() {
     int status = 0;
     if (shell_.options.check) {
         note_programs(state_.session, ini);
+        note_own_modules(state_.session, ini);
         status = check_version();
     }
     status |= read("HALFILE", files);

@@ -89,6 +89,12 @@ void Absences::count(Cause cause) {
         entry.first = command_;
     }
     entry.counted = command_;
+    const bool is_counted =
+        unchecked_.source == command_.source && unchecked_.begin == command_.begin;
+    if (unchecked_lines_ == 0 || !is_counted) {
+        ++unchecked_lines_;
+    }
+    unchecked_ = command_;
 }
 
 /// Nothing that is there has such names, so it is not a typing error in one of them.

@@ -52,6 +52,9 @@ public:
     /// have any name.
     std::optional<Cause> assumed(const std::string& component);
 
+    /// From now on only names that are noted depend on it.
+    void narrow(Cause cause) { causes_[cause].scope = Scope::names; }
+
     /// Returns whether `name` was passed to assume().
     bool is_assumed(const std::string& name) const { return assumed_.contains(name); }
 
@@ -65,6 +68,9 @@ public:
     /// A netlist that cannot be read: names that it may define are not errors in the texts after
     /// it.
     void note_missing_text(const std::string& path);
+
+    /// Returns how many lines were not checked, also those that were reported already.
+    std::size_t unchecked_lines() const { return unchecked_lines_; }
 
     /// True when functions or signals may be in use by something that is missing.
     bool open() const { return open_; }
@@ -97,6 +103,8 @@ private:
     Span command_;
     std::unordered_set<std::string> heads_;  ///< the names of the model up to their first dot
     std::size_t heads_of_ = 0;  ///< how many names the model had
+    std::size_t unchecked_lines_ = 0;
+    Span unchecked_;  ///< the last of them
     bool open_ = false;
 };
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """hal check: several files, INI files, missing parts; special files, for every command that reads a file."""
+
 import os
 import re
 import subprocess
@@ -51,7 +52,7 @@ class Check(Case):
         (self.folder / "library").mkdir()
         self.environment["HALLIB_DIR"] = str(self.folder / "library")
         self.write("machine.hal", MACHINE)
-        self.write("library/library.hal", "net lib pid.x.error joint.0.f-error-lim\n")
+        self.write("library/library.hal", "net lib pid.x.error joint.0.jog-scale\n")
         self.write(
             "more.hal",
             "net more joint.0.amp-enable-out => pid.x.enable\nsetp pid.x.Igain 1\nsetp pid.y.Dgain 2\n",
@@ -72,11 +73,9 @@ class Check(Case):
             said,
         )
         self.assertIn(
-            "9 lines refer to names that no loaded component has; they were not checked", said
+            "3 lines refer to names that no loaded component has; they were not checked", said
         )
-        self.assertIn(
-            "possibly from component 'trivkins', component 'motmod', component 'hal_card'", said
-        )
+        self.assertIn("possibly from programs of LinuxCNC, component 'hal_card'", said)
         self.assertIn(
             "depends on program 'pyvcp', which is not started here; it was not checked", said
         )
@@ -85,18 +84,18 @@ class Check(Case):
     def test_a_single_missing_component_has_all_lines(self):
         self.write(
             "a.hal",
-            "loadrt motmod\nloadrt pid names=pid.x\nnet c joint.0.pos-cmd => pid.x.command\naddf pid.x.do-pid-calcs servo-thread\n",
+            "loadrt hal_card\nloadrt pid names=pid.x\nnet c card.0.adc-00 => pid.x.command\naddf pid.x.do-pid-calcs servo-thread\n",
         )
-        self.write("b.hal", "net d joint.0.pos-fb pid.x.feedback\nsetp pid.x.Pgain 1\n")
+        self.write("b.hal", "net d card.0.adc-01 pid.x.feedback\nsetp pid.x.Pgain 1\n")
         said = self.bad("check", "a.hal", "b.hal")
         self.assertEqual(
-            ["a.hal:1:8: error: unknown component 'motmod' [no-such-component]"],
+            ["a.hal:1:8: error: unknown component 'hal_card' [no-such-component]"],
             self.errors(said),
             said,
         )
         self.assertIn("= help: 2 lines depend on it; they were not checked", said)
         self.assertIn(
-            "b.hal:1:1: warning: 1 line depends on component 'motmod', which is missing; it was not checked [unchecked-lines]",
+            "b.hal:1:1: warning: 1 line depends on component 'hal_card', which is missing; it was not checked [unchecked-lines]",
             said,
         )
 
@@ -107,7 +106,7 @@ class Check(Case):
         )
         said = self.bad("check", "machine.ini", "b.hal")
         self.assertEqual(
-            [f"b.hal:{line}" for line in (1, 2, 3, 4, 5)],
+            [f"b.hal:{line}" for line in (1, 1, 2, 3, 4, 5)],
             [
                 ":".join(line.split(":")[:2])
                 for line in self.errors(said)
@@ -115,7 +114,13 @@ class Check(Case):
             ],
             said,
         )
-        for name in ("pdi.x.command", "pid.x.Nogain", "pid.z.do-pid-calcs", "'nothing'"):
+        for name in (
+            "pdi.x.command",
+            "joint.0.x",
+            "pid.x.Nogain",
+            "pid.z.do-pid-calcs",
+            "'nothing'",
+        ):
             self.assertIn(name, "\n".join(self.errors(said)))
 
     def test_assume(self):
@@ -130,7 +135,10 @@ class Check(Case):
             "machine.ini",
         )
         self.assertEqual((0, []), (said.returncode, self.errors(said.stderr)), said.stderr)
-        self.assertIn("9 lines refer to names that no loaded component has", said.stderr)
+        self.assertIn("3 lines refer to names that no loaded component has", said.stderr)
+        self.assertTrue(
+            said.stderr.endswith("machine.ini: no errors; 6 lines were not checked\n"), said.stderr
+        )
         self.write("c.hal", "loadrt and2 names=a\nnet s far.out => a.in0\n")
         self.assertIn("far.out", self.bad("check", "c.hal"))
         said = self.run_program("check", "--assume", "far", "c.hal")
@@ -151,6 +159,32 @@ class Check(Case):
         self.assertNotIn("far.modbus", said)
         self.assertIn("unknown pin 'a.in7'", said)
         self.assertIn("on 'modbus', which is assumed to exist", said)
+
+    def test_what_depends_on_a_failed_loadrt_is_counted_with_its_error(self):
+        self.write(
+            "c.hal",
+            "loadrt modmath mod_dir=none\nloadrt threads name1=t period1=1000000\n"
+            "addf mod-dir.0 t\nsetp mod-dir.0.desired 3\nloadrt and2 names=a\naddf a t\n"
+            "setp a.in7 1\n",
+        )
+        said = self.bad("check", "c.hal")
+        self.assertEqual(
+            ["mod_dir=none is not a whole number", "unknown pin 'a.in7'"],
+            [line.split(": ")[-1].split(" [")[0] for line in self.errors(said)],
+            said,
+        )
+        self.assertIn("= help: 2 lines depend on it; they were not checked\n", said)
+
+    def test_the_verdict_has_the_number_of_lines_that_were_not_checked(self):
+        self.write("c.hal", "loadrt and2 names=a\nloadusr -Wn p pyvcp p.xml\nnet s p.x => a.in0\n")
+        self.write("d.hal", "net t p.y => a.in1\nnet u p.z\n")
+        self.write("e.hal", "setp a.in0 1\n")
+        said = self.run_program("check", "c.hal", "d.hal").stderr
+        self.assertIn("\nc.hal: no errors; 1 line was not checked\n", said)
+        self.assertTrue(said.endswith("\nd.hal: no errors; 2 lines were not checked\n"), said)
+        self.write("f.hal", "loadrt and2 names=a\n")
+        said = self.run_program("check", "f.hal", "e.hal").stderr
+        self.assertTrue(said.endswith("f.hal: no errors\ne.hal: no errors\n"), said)
 
     def test_files_of_the_library(self):
         self.write("x.ini", "[HAL]\nHALFILE = LIB:nowhere.hal\n")
@@ -221,6 +255,110 @@ class Check(Case):
         self.write("a.hal", SERVO + "setp adder.nothing 1\n")
         said = self.bad("check", "a.hal", self.write("b.hal", "net total => adder.in0\n"))
         self.assertEqual(1, len(self.errors(said)), said)
+
+
+MOTION = """loadrt trivkins coordinates=XY
+loadrt motmod servo_period_nsec=1000000 num_joints=2 num_spindles=1
+loadrt pid names=pid.x
+addf motion-command-handler servo-thread
+addf motion-controller servo-thread
+addf pid.x.do-pid-calcs servo-thread
+net x-command joint.0.motor-pos-cmd => pid.x.command
+net x-output pid.x.output
+"""
+
+
+class Motion(Case):
+    """LinuxCNC's motion controller is checked by the names that it has, also where it is not installed."""
+
+    ASSUMED = ("--assume", "trivkins", "--assume", "motmod")
+
+    def setUp(self):
+        super().setUp()
+        self.environment["HAL_RTMOD_DIR"] = "/nowhere"
+
+    def check(self, lines, status=0, netlist=MOTION):
+        self.write("m.hal", netlist + lines)
+        done = self.run_program("check", *self.ASSUMED, "m.hal")
+        self.assertEqual(status, done.returncode, done.stderr)
+        return done.stderr
+
+    def test_a_complete_netlist_has_no_errors(self):
+        said = self.check(
+            "setp joint.1.jog-scale 1\nnet home joint.0.home-sw-in <= joint.1.homed\n"
+            "setp spindle.0.at-speed 1\nsetp axis.w.jog-enable 1\nsetp motion.digital-in-03 1\n"
+            "net index joint.0.index-enable spindle.0.index-enable\n"
+        )
+        self.assertTrue(said.endswith("m.hal: no errors\n"), said)
+
+    def test_a_typing_error_is_found(self):
+        said = self.check("net x-position joint.0.motor-pos-fbx\n", 1)
+        self.assertIn("error: unknown pin 'joint.0.motor-pos-fbx'", said)
+        self.assertIn("did you mean 'joint.0.motor-pos-fb'?", said)
+
+    def test_types_and_directions_are_checked(self):
+        self.assertIn("[type-mismatch]", self.check("net x-output joint.0.home-sw-in\n", 1))
+        self.assertIn("[two-writers]", self.check("net x-output joint.0.pos-fb\n", 1))
+
+    def test_the_arguments_give_the_numbers(self):
+        for name in (
+            "joint.2.pos-cmd",
+            "spindle.1.on",
+            "motion.digital-out-04",
+            "motion.misc-error-00",
+            "joint.0.unlock",
+            "joint.1.posthome-cmd",
+        ):
+            self.assertIn(f"unknown pin '{name}'", self.check(f"net s {name}\n", 1))
+        larger = MOTION.replace(
+            "num_joints=2 num_spindles=1",
+            "num_joints=3 num_extrajoints=1 num_spindles=2 num_dio=5 num_misc_error=1 "
+            "unlock_joints_mask=1 names_ain=load,heat base_period_nsec=500000",
+        )
+        said = self.check(
+            "net a joint.2.pos-cmd\nnet b spindle.1.on\nnet c motion.digital-out-04\n"
+            "net d motion.misc-error-00\nnet e joint.0.unlock\nsetp joint.2.posthome-cmd 1\n"
+            "net g motion.ain-heat\nloadrt and2 names=q\naddf q base-thread\n",
+            netlist=larger,
+        )
+        self.assertTrue(said.endswith("m.hal: no errors\n"), said)
+        self.assertIn(
+            "num_joints=17 is outside 1..16",
+            self.check("", 1, MOTION.replace("num_joints=2", "num_joints=17")),
+        )
+        self.assertIn(
+            "did you mean 'num_joints'?",
+            self.check("", 1, MOTION.replace("num_joints=2", "num_jionts=2")),
+        )
+
+    def test_names_of_programs_are_counted(self):
+        said = self.check("net tool iocontrol.0.tool-change\nnet on halui.machine.is-on\n")
+        self.assertIn("2 lines depend on programs of LinuxCNC, which are not started here", said)
+        self.assertTrue(said.endswith("m.hal: no errors; 2 lines were not checked\n"), said)
+
+    def test_an_own_home_module_may_add_pins_to_the_joints(self):
+        own = "net own joint.0.torque-at-stop\n"
+        self.assertIn("unknown pin 'joint.0.torque-at-stop'", self.check(own, 1))
+        self.write("m.hal", MOTION + own)
+        self.write("m.ini", "[HAL]\nHALFILE = m.hal\n[EMCMOT]\nHOMEMOD = torquehome limit=2\n")
+        done = self.run_program("check", *self.ASSUMED, "m.ini")
+        self.assertEqual(0, done.returncode, done.stderr)
+        self.assertIn(
+            "1 line depends on module 'torquehome', which is not loaded here", done.stderr
+        )
+        self.ASSUMED = (*self.ASSUMED, "--assume", "homecomp")
+        self.check(own, netlist="loadrt homecomp\n" + MOTION)
+
+    def test_without_linuxcnc_the_other_lines_are_checked(self):
+        self.write("m.hal", MOTION + "net x-position joint.0.motor-pos-fbx\n")
+        said = self.bad("check", "m.hal")
+        for error in (
+            "unknown component 'trivkins'",
+            "unknown component 'motmod'",
+            "unknown pin 'joint.0.motor-pos-fbx'",
+        ):
+            self.assertIn(error, said)
+        self.assertTrue(said.endswith("\n3 errors\n"), said)
 
 
 class SpecialFiles(Case):

@@ -5,6 +5,7 @@ present text, as `hal check` does, although the models before and beside it have
 
 import re
 import shutil
+import socket
 import unittest
 
 from harness import ROOT, Case
@@ -58,7 +59,7 @@ class Card(Case):
         got = self.shown(name)
         self.mill.write_text(bad)
         wanted = self.checked(self.mill)
-        self.assertGreater(len(wanted), 10)
+        self.assertEqual(["bad-argument"], wanted)
         self.assertEqual(wanted, got)
         self.client.change(name, self.good)
         self.assertEqual([], self.shown(name))
@@ -83,6 +84,30 @@ class Card(Case):
         other.write_text(swapped(self.good))
         got = self.shown(self.client.open(other))
         self.assertEqual(self.checked(other), got)
+
+
+class RealCard(Case):
+    def test_a_card_of_hardware_is_not_contacted(self):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as card:
+            card.bind(("127.0.0.1", 27181))
+            card.setblocking(False)
+            client = Client(self.environment, self.folder)
+            self.addCleanup(client.kill)
+            text = (
+                "loadrt threads name1=t period1=1000000\nloadrt mesa board=eth:127.0.0.1\n"
+                "addf hm2_7i76e.0.read t\nloadrt and2 names=a\naddf a t\n"
+            )
+            name = client.open("untitled:1", text)
+            found = client.diagnostics(name)
+            self.assertEqual(["unchecked-lines"], [one["code"] for one in found])
+            self.assertIn(
+                "1 line depends on 'mesa', whose hardware is not contacted here",
+                found[0]["message"],
+            )
+            client.change(name, text + "setp a.in7 1\n")
+            self.assertIn("no-such-pin", [one["code"] for one in client.diagnostics(name)])
+            with self.assertRaises(BlockingIOError):
+                card.recv(2000)
 
 
 if __name__ == "__main__":

@@ -162,8 +162,8 @@ class Roots(Lsp):
 
     def test_settings_name_an_ini_file_and_assumed_components(self):
         ini = self.write("values.ini", "[X]\nIN = adder.in0\n")
-        text = MACHINE + "loadrt motmod\nnet a joint.0.x => adder.in1\nsetp [X]IN 5\n"
-        client = self.client(settings={"halcyon": {"ini": ini, "assume": ["motmod"]}})
+        text = MACHINE + "loadrt hal_card\nnet a card.0.x => adder.in1\nsetp [X]IN 5\n"
+        client = self.client(settings={"halcyon": {"ini": ini, "assume": ["hal_card"]}})
         name = client.open(self.write("m.hal", text))
         self.assertEqual({"unchecked-lines"}, {code for code, _ in codes(client.diagnostics(name))})
 

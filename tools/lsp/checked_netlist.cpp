@@ -15,6 +15,13 @@ namespace hal::tools {
 
 namespace {
 
+/// What `hal check` does, at each change of a text.
+SessionOptions in_editor() {
+    SessionOptions options = offline();
+    options.hardware_allowed = false;
+    return options;
+}
+
 std::uint64_t load_number = 0;  // of the newest load
 
 bool is_file(const std::string& path) {
@@ -48,7 +55,7 @@ void CheckedNetlist::load() {
     const bool is_netlist = root_.command.empty() && root_.path.starts_with('/');
     auto nodes = is_netlist ? nodes_of({root_.path}, root_.ini) : std::vector<NodeLine>{};
     if (!nodes.empty()) return load_nodes(std::move(nodes), options);
-    session_ = std::make_unique<Session>(offline());
+    session_ = std::make_unique<Session>(in_editor());
     sessions_ = {session_.get()};
     for (const std::string& name : root_.assumed) {
         session_->absences().assume(name);
@@ -60,7 +67,7 @@ void CheckedNetlist::load() {
 }
 
 void CheckedNetlist::load_nodes(std::vector<NodeLine> nodes, const ShellOptions& options) {
-    cell_ = std::make_unique<Cell>(cell_name({root_.path}), std::move(nodes), offline(), options);
+    cell_ = std::make_unique<Cell>(cell_name({root_.path}), std::move(nodes), in_editor(), options);
     for (std::size_t i = 0; i < cell_->size(); ++i) {
         sessions_.push_back(&cell_->session(i));
         shells_.push_back(&cell_->shell(i));

@@ -52,6 +52,27 @@ void report_part(const CheckOptions& options, const Collected& output,
                               readers.front()));
 }
 
+/// Reports a file without errors, and how many of its lines were not checked.
+class Verdicts {
+public:
+    explicit Verdicts(Session& session) : session_(session) {}
+    void report(const std::string& path) {
+        const std::size_t unchecked = session_.absences().unchecked_lines();
+        const std::size_t lines = unchecked - before_;
+        before_ = unchecked;
+        std::string verdict = path + ": no errors";
+        if (lines > 0) {
+            verdict += fmt::format("; {} {} not checked", counted(lines, "line"),
+                                   lines == 1 ? "was" : "were");
+        }
+        write_all(STDERR_FILENO, verdict + "\n");
+    }
+
+private:
+    Session& session_;
+    std::size_t before_ = 0;
+};
+
 }  // namespace
 
 int run_check(const CheckOptions& options) {
@@ -67,9 +88,8 @@ int run_check(const CheckOptions& options) {
     how.linuxcnc = options.linuxcnc;
     how.color = colours(STDERR_FILENO);
     Shell shell(session, how);
-    const auto good = [](const std::string& path) {
-        write_all(STDERR_FILENO, path + ": no errors\n");
-    };
+    Verdicts verdicts(session);
+    const auto good = [&](const std::string& path) { verdicts.report(path); };
     const bool may_be_part = options.words.size() == 1 && options.ini.empty();
     const auto readers =
         may_be_part ? files_that_read(options.words.front()) : std::vector<std::string>{};

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "hal/component.hpp"
+#include "hal/hardware.h"
 #include "hal/naming.hpp"
 #include "hal/texts.hpp"
 #include "mesa/driver/card_image.hpp"
@@ -27,7 +28,7 @@ struct MesaNames {
 
 /// The first base of a component: it reads what the card has before the pins are declared, because
 /// the pins and the name of the instance depend on it. It contacts the card also for `hal check`,
-/// and only reads, unless smart serial is used.
+/// and only reads, unless smart serial is used. In an editor it contacts none.
 class LoadedCard {
 protected:
     LoadedCard(const hal_host* host, const MesaNames& names) {
@@ -100,8 +101,16 @@ private:
         if (text == "thread" || text == "card") return text == "card";
         throw hal::ArgumentError("clock", "invalid clock '" + text + "'; write thread or card");
     }
+    static bool is_hardware_denied() {
+        const auto* const hardware = hal::extension<hal_hardware>(HAL_HARDWARE);
+        return hardware != nullptr && !hardware->request(hal::detail::creating);
+    }
     void contact(const MesaNames& names, const std::string& board) {
-        datagram::Opened opened = datagram::open(datagram::address_of(board), {.port = udp_port});
+        const std::string address = datagram::address_of(board);
+        if (!datagram::describe(address).in_memory && is_hardware_denied()) {
+            hal::detail::rejected();
+        }
+        datagram::Opened opened = datagram::open(address, {.port = udp_port});
         if (!opened) {
             throw hal::ArgumentError(names.board, opened.problem);
         }

@@ -145,7 +145,8 @@ bool construct_one(Edit& edit, LoadedComponent& component, const LoadRequest& re
     };
     if (!create()) {
         if (c.no_memory) throw std::bad_alloc();
-        if (c.said_why && c.failure.empty()) return false;
+        const bool is_explained = c.said_why || c.hardware_denied;
+        if (is_explained && c.failure.empty()) return false;
         report_failure(component, request, sources, c, diagnostics);
         return false;
     }

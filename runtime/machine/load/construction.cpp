@@ -7,6 +7,7 @@
 #include <cstring>
 
 #include "base/types.hpp"
+#include "machine/load/elaborate.hpp"
 
 namespace hal {
 namespace {
@@ -225,6 +226,13 @@ const char* argument_of_program(const hal_host* host, const char* program) {
     return argument ? argument->c_str() : nullptr;
 }
 
+bool request_hardware(const hal_host* host) {
+    Construction& c = construction_of(host);
+    c.hardware_denied = c.request.on != nullptr && !c.request.on->hardware_allowed;
+    return !c.hardware_denied;
+}
+
+constexpr hal_hardware hardware_extension{sizeof hardware_extension, request_hardware};
 constexpr hal_assumed assumed_extension{sizeof assumed_extension, is_assumed};
 constexpr hal_unstarted unstarted_extension{sizeof unstarted_extension, argument_of_program};
 
@@ -233,6 +241,7 @@ const void* extension_of(const hal_host* host, const char* id) {
     if (std::strcmp(id, HAL_NAMING) == 0) return &naming_extension;
     if (std::strcmp(id, HAL_PIN_NAMES) == 0) return &pin_names_extension;
     if (std::strcmp(id, HAL_ASSUMED) == 0) return &assumed_extension;
+    if (std::strcmp(id, HAL_HARDWARE) == 0) return &hardware_extension;
     if (std::strcmp(id, HAL_UNSTARTED) == 0) return &unstarted_extension;
     if (std::strcmp(id, HAL_RETAINED) == 0) return &retained_extension;
     if (std::strcmp(id, HAL_MODULES) == 0) return &modules_extension;

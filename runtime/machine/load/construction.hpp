@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "hal/assumed.h"
+#include "hal/hardware.h"
 #include "hal/modules.h"
 #include "hal/naming.h"
 #include "hal/pin_names.h"
@@ -61,6 +62,7 @@ struct Construction {
     std::vector<std::string> texts = {};  // keeps what argument() gave
     Failure failure = {};
     bool no_memory = false;
+    bool hardware_denied = false;
     std::string serial = {};             // of an instance that is named after its component
     bool whole_function_names = false;
     bool whole_pin_names = false;

@@ -34,6 +34,7 @@ struct Elaboration {
     bool check_only = false;  ///< `hal check`: code that may access hardware does not run
     Transaction* transaction = nullptr;  ///< whose edits these are
     const hal_faults* faults = nullptr;  ///< the fault record of the machine
+    bool hardware_allowed = true;  ///< false: constructors must not access hardware
 };
 
 /// Carries out `addf --auto`.

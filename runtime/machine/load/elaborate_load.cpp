@@ -6,6 +6,7 @@
 #include <array>
 
 #include "machine/load/construct.hpp"
+#include "machine/load/described_modules.hpp"
 #include "machine/load/module_library.hpp"
 #include "machine/load/thread_options.hpp"
 #include "text/quoting.hpp"
@@ -334,22 +335,60 @@ std::optional<Absences::Cause> accepted_absence(Elaboration& on, const Token& na
     return absences.assumed(name.text);
 }
 
+/// Returns why nothing was made of a component: the first error after `before` diagnostics, or else
+/// that its hardware may not be accessed.
+Absences::Cause cause_of_failure(Elaboration& on, const Token& name, const LoadRequest& request,
+                                 std::size_t before) {
+    // without names= the instances may have any name: that of a card, for example
+    const auto scope = request.names.empty() ? Absences::Scope::component : Absences::Scope::names;
+    const auto reported = std::span(on.diagnostics.all()).subspan(before);
+    const auto error = std::ranges::find(reported, Severity::error, &Diagnostic::severity);
+    if (error == reported.end()) {
+        return on.edit.absences().add(hal::quoted(name.text),
+                                      "whose hardware is not contacted here", {}, scope);
+    }
+    const Span at = error->labels.empty() ? name.span : error->labels[0].span;
+    return on.edit.absences().add("component " + hal::quoted(name.text), "which is missing", at,
+                                  scope);
+}
+
 /// Notes the names of a component of which nothing was made.
 void note_absence(Elaboration& on, const Token& name, const LoadRequest& request,
-                  std::optional<Absences::Cause> cause, bool known) {
+                  Absences::Cause cause) {
     Absences& absences = on.edit.absences();
     const bool has_names = !request.names.empty();
-    if (!known && !cause) {
-        const auto scope = has_names ? Absences::Scope::names : Absences::Scope::component;
-        cause = absences.add("component " + hal::quoted(name.text), "which is missing", name.span,
-                             scope);
-    }
     for (const std::string& instance : request.names) {
         absences.note(instance, cause);
     }
     if (has_names) return;
     absences.note(name.text, cause);
     absences.note(dashed(name.text), cause);
+    const bool may_home_joints = name.text.find("home") != std::string::npos;
+    if (may_home_joints) {
+        absences.note("joint", cause);
+    }
+}
+
+/// `hal check`: declares what a module of LinuxCNC has that does not run here. Returns false when
+/// that is unknown.
+bool describe_module(Elaboration& on, const Token& name, const LoadRequest& request,
+                     const std::string& written) {
+    const hal_component* const description = on.check_only ? description_of(name.text) : nullptr;
+    if (description == nullptr || on.model.find_component(name.text) != nullptr) return false;
+    LoadedComponent& component = on.edit.add_component(description->name, name.span);
+    component.plugin = description;
+    component.shares_pins = true;
+    Load load;
+    for (const auto& [key, given] : request.arguments) {
+        load.arguments.emplace(key, LoadArgument{given.value});
+    }
+    on.edit.note_arguments(component, written, std::move(load));
+    if (!construct(on.model, on.edit, component, request, on.sources, on.diagnostics)) return false;
+    if (name.text == "motmod") {
+        on.edit.absences().add("programs of LinuxCNC", "which are not started here", {},
+                               Absences::Scope::component);
+    }
+    return true;
 }
 
 }  // namespace
@@ -373,9 +412,16 @@ void edits::loadrt(Elaboration& on, Args args) {
     LoadRequest request;
     const bool known = on.model.find_component(name.text) || !on.plugins.find(name.text).empty();
     const auto cause = accepted_absence(on, name, origin, known);
+    const std::size_t before = on.diagnostics.all().size();
     const bool readable = read_request(on, name, origin, arguments, request);
     if (readable && !cause && make_instances(on, name, origin, request, text)) return;
-    note_absence(on, name, request, cause, known);
+    if (readable && describe_module(on, name, request, text)) {
+        if (cause) {
+            on.edit.absences().narrow(*cause);
+        }
+        return;
+    }
+    note_absence(on, name, request, cause ? *cause : cause_of_failure(on, name, request, before));
 }
 
 /// `unloadrt NAME`: removes a component with its instances, one instance, or with `all` everything

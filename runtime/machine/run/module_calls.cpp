@@ -99,9 +99,17 @@ int carry_out(const hal_host* host, const char* const* words, std::size_t count,
         }
         const Elaboration& outer = *c.request.on;
         Diagnostics found;
-        Elaboration on{
-            outer.model,       outer.edit,      outer.plugins,    outer.sources,     found,
-            outer.auto_orders, {row->name, ""}, outer.check_only, outer.transaction, outer.faults};
+        Elaboration on{outer.model,
+                       outer.edit,
+                       outer.plugins,
+                       outer.sources,
+                       found,
+                       outer.auto_orders,
+                       {row->name, ""},
+                       outer.check_only,
+                       outer.transaction,
+                       outer.faults,
+                       outer.hardware_allowed};
         {
             struct Restore {  // also when memory runs out on the way
                 Edit& edit;

@@ -39,6 +39,7 @@ struct SessionOptions {
     std::string name = "default";  ///< of the instance; its control socket carries it
     bool virtual_clock = false;  ///< `hal sim`: threads run only in ThreadControl::advance_ns()
     bool check_only = false;  ///< `hal check`: construct, but start nothing
+    bool hardware_allowed = true;  ///< false, as in an editor: constructors access no hardware
     /// virtual clock: how long, in wall time, a command waits for a program; 0: without limit
     std::int64_t wait_limit_ns = 0;
     /// Longest gap without CPU that is reported and does not stop a thread: without a real-time

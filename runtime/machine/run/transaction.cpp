@@ -55,11 +55,17 @@ void Transaction::apply(const EditForm& form, const Command& command, Diagnostic
                 thread->init_done = core->passed();
             }
         }
-        Elaboration on{s.model,     edit,
-                       s.plugins,   machine_->sources,
-                       diagnostics, s.transaction.auto_orders(),
-                       form.usage,  s.options.check_only,
-                       this,        s.executor ? &s.executor->board().shared.faults : nullptr};
+        Elaboration on{s.model,
+                       edit,
+                       s.plugins,
+                       machine_->sources,
+                       diagnostics,
+                       s.transaction.auto_orders(),
+                       form.usage,
+                       s.options.check_only,
+                       this,
+                       s.executor ? &s.executor->board().shared.faults : nullptr,
+                       s.options.hardware_allowed};
         for (const Command& plain : expand(command, diagnostics)) {
             s.transaction.count_command();
             elaborate(on, form, plain);
