@@ -3,7 +3,9 @@
 #include "command_line.hpp"
 
 #include <algorithm>
+#include <cstdlib>
 #include <fmt/format.h>
+#include <iterator>
 #include <memory>
 #include <optional>
 
@@ -17,6 +19,7 @@
 #include "text/diagnostic.hpp"
 #include "text/find_row.hpp"
 #include "text/quoting.hpp"
+#include "text/typed_command.hpp"
 
 namespace hal::tools {
 
@@ -69,6 +72,38 @@ std::string summary_of(const Group& group) {
     return fmt::format("{}: {}", group.purpose, fmt::join(names, ", "));
 }
 
+/// A command of the script `hal` of a clone, which carries it out itself.
+struct CloneCommand {
+    std::string_view name, usage, summary;
+};
+
+constexpr CloneCommand clone_commands[] = {
+    {"build", "[NAME | FILE]…", "build everything, or what these components and netlists need"},
+    {"test", "[quick]", "run all tests, or those of the release build only"},
+    {"board", "armhf | arm64", "run the unit and netlist tests for a board, under an emulator"},
+    {"bench", "[OPTION]…", "print the figures"},
+    {"package", "[armhf | arm64 | --release KEY]", "make Debian packages in build/packages"},
+};
+
+const CloneCommand* find_clone_command(std::string_view name) {
+    const auto* const found = std::ranges::find(clone_commands, name, &CloneCommand::name);
+    return found == std::end(clone_commands) ? nullptr : found;
+}
+
+/// Whether the script of a clone has started this program.
+bool is_in_clone() { return std::getenv("HALCYON_BUILD") != nullptr; }
+
+/// Prints the help of a command that only a clone has. Returns the exit code.
+int help_of(const CloneCommand& command) {
+    if (is_in_clone()) {
+        return exit_code(print(fmt::format("hal {}: {}\n\nusage: ./hal {} {}\n", command.name,
+                                           command.summary, command.name, command.usage)));
+    }
+    return fail(Options{}, fmt::format("'{0}' is a command of a clone of the sources; type there: "
+                                       "./hal {0} {1}",
+                                       command.name, command.usage));
+}
+
 struct Found {
     const Subcommand* row = nullptr;
     std::size_t words = 0;  ///< number of typed words that form its name
@@ -104,6 +139,12 @@ std::string overview() {
             text += fmt::format("  {:11} {}\n", group->name, summary_of(*group));
         }
         last = group;
+    }
+    if (is_in_clone()) {
+        text += "\nIn this clone also:\n";
+        for (const CloneCommand& command : clone_commands) {
+            text += fmt::format("  {:11} {}\n", command.name, command.summary);
+        }
     }
     return text +
            "\nFor details: hal help COMMAND. A first try: hal examples furuta/hang --for "
@@ -162,6 +203,7 @@ int no_such_command(const std::vector<std::string>& typed) {
     const auto ends = [&](std::string_view end) {
         return word.size() > end.size() && word.ends_with(end);
     };
+    if (const CloneCommand* const command = find_clone_command(word)) return help_of(*command);
     if (ends(".hal") || ends(".ini")) {
         return fail(options,
                     fmt::format("'{0}' is not a command; to run it type: hal run {0}", word));
@@ -227,7 +269,7 @@ int print_version(const std::vector<std::string>& words) {
 }
 
 int help(const std::vector<std::string>& about) {
-    if (about.empty()) return exit_code(print(overview()));
+    if (about.empty()) return exit_code(print(as_typed(overview())));
     if (const Found found = find(about); found.row) {
         const TreePackage* const missing = found.row->missing_package();
         if (missing) return refuse(found.row->name, *missing);
@@ -375,9 +417,8 @@ void add_word(const Subcommand& row, std::vector<CompletionWord>& to) {
 
 void add_option(const OptionSet::Row& row, const std::string& name,
                 std::vector<CompletionOption>& to) {
-    const bool known = std::any_of(to.begin(), to.end(), [&](const CompletionOption& other) {
-        return other.name == name;
-    });
+    const bool known = std::any_of(
+        to.begin(), to.end(), [&](const CompletionOption& other) { return other.name == name; });
     if (!known) {
         to.push_back({{name, row.text}, row.takes_value});
     }

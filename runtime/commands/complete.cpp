@@ -284,7 +284,9 @@ constexpr Kind kinds[] = {
     {"COMMAND",
      [](Search& s) {
     for (const auto& row : command_table()) {
-        s.add(row.name, row.summary);
+        if (!row.is_for_tests()) {
+            s.add(row.name, row.summary);
+        }
     }
 }},
     {"CODE", [](Search& s) { s.add_names(all_code_pages()); }},
@@ -381,6 +383,7 @@ Completion complete_line(Session& session, const ShellOptions& options, std::str
     }
     if (search.words.empty()) {
         for (const auto& row : command_table()) {
+            if (row.is_for_tests()) continue;
             search.add(row.name, row.summary);
             if (*row.also) {
                 search.add(row.also, row.summary);

@@ -82,6 +82,7 @@ void command_help(Context& context) {
         if (context.checking()) return;
         std::string text;
         for (const auto& row : command_table()) {
+            if (row.is_for_tests()) continue;
             text += fmt::format("  {:<14} {}\n", names_of(row), row.summary);
         }
         context.output.out(text + "`help COMMAND` describes a command, `explain CODE` an error.\n");

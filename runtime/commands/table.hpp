@@ -114,6 +114,8 @@ struct CommandRow {
     unsigned lock;          ///< bits of Lock that forbid it
     Behaviour behaviour;
 
+    /// Accepted for netlists of tests, and not listed.
+    bool is_for_tests() const { return std::string_view(name).ends_with("_for_test_suite_only"); }
     bool edits() const { return function.edit != nullptr; }
     bool is_query() const { return behaviour.effect == Effect::reading; }
     /// Does not access the machine.

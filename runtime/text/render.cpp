@@ -7,6 +7,7 @@
 #include "text/glyphs.hpp"
 #include "text/quoting.hpp"
 #include "text/rendered_order.hpp"
+#include "text/typed_command.hpp"
 
 namespace hal {
 
@@ -68,7 +69,7 @@ public:
             }
         }
         for (const std::string& help : diagnostic_.help) {
-            line_of("= help: ", help);
+            line_of("= help: ", as_typed(help));
         }
         return std::move(out_);
     }

@@ -47,7 +47,7 @@ if [ -e "$TOOLS/together" ]; then
 fi
 if [ -e "$TOOLS/steps" ]; then cat "$TOOLS/steps"; else echo "[1/1 0.5] link"; fi
 cd "$2/../.."
-printf '#!/bin/sh\\necho "started: $*"\\necho "builds with $HALCYON_BUILD"\\n' >build/release/bin/hal
+printf '#!/bin/sh\\necho "started: $*"\\necho "builds with $HALCYON_BUILD"\\necho "started as $HALCYON_STARTED_AS"\\n' >build/release/bin/hal
 chmod +x build/release/bin/hal
 """
 APT = """#!/bin/sh
@@ -154,6 +154,7 @@ class Script(unittest.TestCase):
         )
         self.assertEqual("hal: building the program and 2 components in build/release\n", self.said)
         self.assertIn("started: run a.hal --for 1s\n", self.printed)
+        self.assertIn(f"started as {self.tree}/hal\n", self.printed)
 
     @unittest.skipUnless(os.geteuid() == 0, "needs root to mount the tree read-only")
     def test_a_read_only_tree_is_built_in_the_cache_of_the_user_also_with_unusual_names(self):
@@ -208,6 +209,7 @@ class Script(unittest.TestCase):
             [self.BUILD + "hal component_sum2 component_pid component_scale"],
             self.hal("run", "b.hal"),
         )
+        self.assertEqual("hal: building a further component in build/release\n", self.said)
         self.assertEqual([], self.hal("run", "b.hal"))
         self.assertEqual([], self.hal("run", "a.hal"))
 
@@ -215,6 +217,7 @@ class Script(unittest.TestCase):
         self.hal("run", "a.hal")
         self.touch("components/math/scale.cpp")
         self.assertEqual([self.BUILD + "hal component_sum2 component_pid"], self.hal("version"))
+        self.assertEqual("hal: building what has changed in build/release\n", self.said)
 
     def test_changed_presets_configure_the_tree_again(self):
         self.hal("run", "a.hal")
@@ -391,6 +394,10 @@ class Script(unittest.TestCase):
         self.assertEqual(
             ["cmake --preset release -DHALCYON_TESTS=OFF -DHALCYON_QUICK=ON", self.BUILD + "hal"],
             self.hal("version"),
+        )
+        self.assertIn(
+            f"hal: this tree was built in {self.folder}/tree: what is needed is built again here\n",
+            self.said,
         )
 
 

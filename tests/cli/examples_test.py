@@ -51,6 +51,14 @@ class Examples(Case):
             self.assertIn(f" --ini {ROOT}/halfiles/{name}.ini --no-picture", done.stdout)
             self.assertEqual(0, done.returncode, done.stderr)
 
+    def test_run_names_the_example_that_a_path_means(self):
+        self.assertEqual(
+            "hal run: 'halfiles/furuta/hang.hal' is not in this folder; to run the example from "
+            "any folder type: hal examples furuta/hang\n",
+            self.bad("run", "halfiles/furuta/hang.hal"),
+        )
+        self.assertIn("No such file", self.bad("run", "halfiles/furuta/hangs.hal"))
+
     def test_unknown_name(self):
         self.assertEqual(
             "hal examples: unknown example 'furuta/hnag'; did you mean 'furuta/hang'?\n",
@@ -59,6 +67,12 @@ class Examples(Case):
         self.assertEqual(
             "hal examples: unknown example 'teapot'; type: hal examples\n",
             self.bad("examples", "teapot"),
+        )
+        cnc = ROOT / "halfiles/linuxcnc-ethernet/cnc"
+        self.assertEqual(
+            "hal examples: 'linuxcnc-ethernet/cnc' is a configuration of LinuxCNC; type: "
+            f"hal linuxcnc {cnc}.ini\n",
+            self.bad("examples", "linuxcnc-ethernet/cnc"),
         )
 
     def test_run_without_a_netlist_lists_them(self):

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Help, wrong words, explain, completion script, doctor."""
+
 import json
 import os
 import shutil
@@ -67,6 +68,34 @@ class BusProgram(Case):
 class WrongWords(Case):
     def test_unknown_command_gets_a_suggestion(self):
         self.assertEqual("hal: unknown command 'shel'; did you mean 'shell'?\n", self.bad("shel"))
+
+    def test_a_command_of_a_clone_is_explained(self):
+        self.assertNotIn("In this clone also", self.good("help"))
+        self.assertEqual(
+            "hal: 'bench' is a command of a clone of the sources; type there: ./hal bench [OPTION]…\n",
+            self.bad("bench"),
+        )
+        self.environment["HALCYON_BUILD"] = "/tree/hal"
+        self.assertIn("\nIn this clone also:\n  build       build everything", self.good("help"))
+        self.assertEqual(
+            "hal test: run all tests, or those of the release build only\n\n"
+            "usage: ./hal test [quick]\n",
+            self.good("help", "test"),
+        )
+
+    def test_commands_for_tests_are_not_listed(self):
+        text = self.good("sim", self.write("m.hal", "newthread t 1ms\nhelp\n"), "--for", "1ms")
+        self.assertIn("\n  unloadrt ", text)
+        self.assertNotIn("for_test_suite_only", text)
+
+    def test_messages_have_the_commands_as_the_program_was_started(self):
+        self.environment["HALCYON_STARTED_AS"] = "./hal"
+        self.assertEqual(
+            "hal: 'x.hal' is not a command; to run it type: ./hal run x.hal\n", self.bad("x.hal")
+        )
+        self.write("m.hal", "loadrt nothing\n")
+        self.assertIn("= help: ./hal doc lists all components", self.bad("check", "m.hal"))
+        self.assertIn("For details: ./hal help COMMAND.", self.good("help"))
 
     @needs_package("canopen")
     def test_commands_with_a_common_beginning(self):
@@ -250,9 +279,7 @@ class CompletionScript(Case):
 
         def offered(line):
             words = line.split(" ")
-            code = (
-                f"{offers}service=hal; words=({line}); CURRENT={len(words)}; PREFIX='{words[-1]}'\n_hal"
-            )
+            code = f"{offers}service=hal; words=({line}); CURRENT={len(words)}; PREFIX='{words[-1]}'\n_hal"
             return self.run_shell("zsh", "-f", "-c", code).splitlines()
 
         self.assertIn("fmt:format netlists", offered("hal f"))

@@ -14,6 +14,7 @@
 #include "cli/standard_streams.hpp"
 #include "hal/read_file.hpp"
 #include "hal/replace_file.hpp"
+#include "text/typed_command.hpp"
 
 namespace hal::tools {
 namespace {
@@ -25,7 +26,7 @@ bool write_all(int descriptor, std::string_view text) {
 }
 
 int fail(const Options& options, std::string_view sentence) {
-    write_all(STDERR_FILENO, options.program + ": " + std::string(sentence) + "\n");
+    write_all(STDERR_FILENO, options.program + ": " + as_typed(sentence) + "\n");
     return 1;
 }
 

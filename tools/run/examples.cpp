@@ -15,6 +15,7 @@
 #include <unistd.h>
 
 #include "cli/output.hpp"
+#include "hal/privilege.hpp"
 #include "machine/load/plugins.hpp"
 #include "machine/load/source_tree.hpp"
 #include "paths.hpp"
@@ -106,11 +107,26 @@ const Example* find(const std::vector<Example>& examples, std::string_view name)
     return found == examples.end() ? nullptr : &*found;
 }
 
+/// Whether a file can be read and is an INI file with netlists of its own.
+bool names_netlists(const std::string& path) {
+    std::ifstream file(path);
+    for (std::string line; std::getline(file, line);) {
+        if (line.starts_with("HALFILE")) return true;
+    }
+    return false;
+}
+
 int no_such_example(const Options& options, const std::vector<Example>& examples,
                     const std::string& name) {
     std::vector<std::string> names;
     for (const Example& example : examples)
         names.push_back(example.name);
+    const std::string configuration = (machines() / (name + ".ini")).string();
+    if (names_netlists(configuration)) {
+        return fail(options,
+                    fmt::format("'{}' is a configuration of LinuxCNC; type: hal linuxcnc {}", name,
+                                privilege::shell_word(configuration)));
+    }
     const std::string hint = did_you_mean(name, names);
     return fail(options, fmt::format("unknown example '{}'; {}", name,
                                      hint.empty() ? "type: hal examples" : hint));
@@ -126,7 +142,11 @@ int become_run(const Options& options, const Example& example,
         words.insert(words.end(), {"--ini", ini.string()});
     }
     words.insert(words.end(), further.begin(), further.end());
-    if (!print(fmt::format("{}\n", fmt::join(words, " ")))) return 1;
+    std::string line;
+    for (const std::string& word : words) {
+        append_item(line, privilege::shell_word(word), " ");
+    }
+    if (!print(line + "\n")) return 1;
     std::vector<char*> arguments;
     for (std::string& word : words)
         arguments.push_back(word.data());
@@ -155,6 +175,14 @@ std::vector<Example> find_examples() {
         return std::tie(a.topic, a.name) < std::tie(b.topic, b.name);
     });
     return examples;
+}
+
+std::string example_meant_by(const std::string& path) {
+    constexpr std::string_view folder = "halfiles/";
+    std::error_code ignored;
+    if (!path.starts_with(folder) || fs::exists(path, ignored)) return {};
+    const std::string name = fs::path(path.substr(folder.size())).replace_extension().string();
+    return find(find_examples(), name) != nullptr ? name : "";
 }
 
 std::string list_of(const std::vector<Example>& examples) {

@@ -26,6 +26,10 @@ std::vector<Example> find_examples();
 /// what installs these. [setup]
 std::string list_of(const std::vector<Example>&);
 
+/// Returns the name of the example that a path such as halfiles/furuta/hang.hal means where there is
+/// no such file; "" for every other path. [setup]
+std::string example_meant_by(const std::string& path);
+
 struct ExamplesOptions : Options {
     void declare(OptionSet& set) override {
         set.keep_rest();  // options of `hal run`

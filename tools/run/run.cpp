@@ -17,6 +17,7 @@
 #include "run/picture.hpp"
 #include "run/report.hpp"
 #include "run/service_notifier.hpp"
+#include "text/typed_command.hpp"
 
 namespace hal::tools {
 
@@ -81,9 +82,9 @@ int run_plain(HostedMachine& machine, const RunOptions& options, std::vector<Nod
         const FaultLines faults(machine.session);
         status = std::max(status, machine.converse({"hal> ", "hal+> "}));
     } else {
-        print(fmt::format("{}; in another terminal: hal shell{}\n",
-                          options.for_ns >= 0 ? "running" : "running until Ctrl-C",
-                          name == "default" ? "" : " --name " + name));
+        const std::string duration = options.for_ns >= 0 ? "running" : "running until Ctrl-C";
+        print(as_typed(fmt::format("{}; in another terminal: hal shell{}\n", duration,
+                                   name == "default" ? "" : " --name " + name)));
         const auto picture = options.no_picture ? nullptr : Picture::start(machine.session);
         const FaultLines faults(machine.session, [&picture](const std::string& line) {
             if (picture) {
@@ -124,6 +125,13 @@ int run_machine(const RunOptions& options, RunJournal* journal) {
         return fail(options,
                     "missing netlist; type: hal run FILE.hal, hal run -I, or for one of "
                     "these machines: hal examples NAME");
+    }
+    for (const std::string& path : options.words) {
+        const std::string example = options.classic ? "" : example_meant_by(path);
+        if (example.empty()) continue;
+        return fail(options, fmt::format("'{}' is not in this folder; to run the example from any "
+                                         "folder type: hal examples {}",
+                                         path, example));
     }
     if (!options.dds.empty() && options.part.empty()) {
         return fail(options,
