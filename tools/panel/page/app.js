@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Views, their place in the URL (#/view?state), the banner and the role. Each view is a module with
 // a class View: its constructor draws it, end() leaves it.
+import {pauseOf, problemOf} from './banner.js';
 import {connect, on, state, tell} from './link.js';
 import {h, announce} from './dom.js';
 import {enter, isShown, parse} from './place.js';
@@ -48,27 +49,6 @@ function drawNav() {
                     h('a', {href: `#/${name}`, 'aria-current': name === current ? 'page' : null},
                       title)));
     nav.querySelector('[aria-current]')?.scrollIntoView({inline: 'nearest', block: 'nearest'});
-}
-
-/// What the banner says; empty while everything is as it should be.
-function problemOf({server, reason, machine, responding, instance}) {
-    if (server === 'connecting') return '';
-    if (server === 'lost')
-        return `No connection to hal panel${reason ? `: ${reason}` : ''}. Values are stale; ` +
-            'reconnecting …';
-    if (!machine)
-        return `Machine '${instance}' is not running. Values are stale; waiting for it. ` +
-            'Start it with: hal run FILE.hal';
-    if (!responding) return `Machine '${instance}' does not respond. Values are stale.`;
-    return '';
-}
-
-/// What the banner says of a machine whose values are valid, but whose functions do not run.
-function pauseOf({server, machine, running, instance, past}) {
-    if (server !== 'up' || !machine || running) return '';
-    if (past) return 'The machine was stopped at this moment: its functions did not run.';
-    return `Machine '${
-        instance}' is stopped: its functions do not run. To start it: hal shell start`;
 }
 
 function drawFaults({machine, faults}) {

@@ -15,7 +15,7 @@ function emit(event, data, payload) {
 
 export const state = {
     server: 'connecting',
-    machine: false,
+    machine: null,   // whether it is up; null until the server has answered
     responding: true,
     running: true,  // false after `stop`: functions do not run
     running_ns: 0,  // machine time of the last change of `running`, 0: unknown

@@ -530,7 +530,11 @@ export class View {
         const type = all.get(name)?.type;
         if (type === 'port') return [`'${name}' is a port, which has no number`];
         if (type) return null;
-        if (!state.machine && this.recording === '') return ['the machine is not running'];
+        if (!state.machine && this.recording === '')
+            return [
+                state.machine === null ? 'the names of the machine are not known yet' :
+                                         'the machine is not running'
+            ];
         return [`unknown name '${name}'`, similar(name, all.keys())];
     }
 
