@@ -202,6 +202,10 @@ class Mesa(MesaNode, Case):
             f"no card answers at {self.host}; an interface of this computer needs an address",
             self.bad("mesa", "scan", self.host, "--timeout", "5ms"),
         )
+        self.assertIn(
+            "no card answers at 127.0.0.8 or 127.0.0.9; ",
+            self.bad("mesa", "scan", "127.0.0.8", "127.0.0.9", "--timeout", "5ms"),
+        )
 
 
 if __name__ == "__main__":

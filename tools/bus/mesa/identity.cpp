@@ -2,7 +2,7 @@
 // `hal mesa scan`, `info` and `pins`: which cards there are, and what they have.
 #include <arpa/inet.h>
 
-#include <fmt/core.h>
+#include <fmt/ranges.h>
 #include <memory>
 
 #include "bus/json_text.hpp"
@@ -187,6 +187,13 @@ bool read_card(const MesaCardOptions& options, CardIdentity& identity) {
 
 }  // namespace
 
+/// Returns the hosts, or how many there are.
+static std::string hosts_text(const std::vector<std::string>& hosts) {
+    constexpr std::size_t few = 4;
+    if (hosts.size() > few) return fmt::format("{} addresses", hosts.size());
+    return fmt::format("{}", fmt::join(hosts, " or "));
+}
+
 int run_mesa_scan(const MesaScanOptions& options) {
     std::vector<std::string> hosts;
     for (const std::string& word : options.words) {
@@ -211,11 +218,9 @@ int run_mesa_scan(const MesaScanOptions& options) {
         if (!print(fmt::format("{}  {}\n", host, what))) return 1;
     }
     if (!found.empty()) return 0;
-    return fail(
-        options,
-        fmt::format("no card answers at {}; an interface of this computer needs "
-                    "an address in the subnet of the card",
-                    hosts.size() == 1 ? hosts[0] : fmt::format("{} addresses", hosts.size())));
+    return fail(options, fmt::format("no card answers at {}; an interface of this computer needs "
+                                     "an address in the subnet of the card",
+                                     hosts_text(hosts)));
 }
 
 int run_mesa_info(const MesaCardOptions& options) {
