@@ -401,6 +401,21 @@ CONFIG/machine.ini [TASK]TASK:1:20: error: 'milltask' ended before a component '
             self.linuxcnc(self.ini(), status=1)[1],
         )
 
+    def test_a_display_with_windows_needs_a_screen(self):
+        axis = self.home / "bin/axis"
+        axis.write_text("#!/bin/sh\nexit 0\n")
+        axis.chmod(0o755)
+        ini = self.ini(text=INI.replace("./ui", "axis"))
+        for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+            self.environment.pop(name, None)
+        self.assertEqual(
+            "hal linuxcnc: CONFIG/machine.ini: [DISPLAY]DISPLAY is 'axis', which opens windows, and the environment has no DISPLAY; "
+            "start it in a terminal of the desktop, or on another computer after: ssh -X\n",
+            self.linuxcnc(ini, status=1)[1],
+        )
+        self.environment["DISPLAY"] = ":9"
+        self.linuxcnc(ini)
+
     def test_bad_ini_files(self):
         version = "hal linuxcnc: CONFIG/machine.ini: [EMC]VERSION is {}, not 1.1: the file is from an older LinuxCNC; type: update_ini CONFIG/machine.ini\n"
         self.assertEqual(

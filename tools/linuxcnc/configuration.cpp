@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "linuxcnc/configuration.hpp"
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <fmt/format.h>
@@ -193,6 +194,14 @@ private:
         if (to_.display[0] != "dummy" && find_program(to_, to_.display[0]).empty()) {
             return missing("[DISPLAY]DISPLAY", to_.display[0]);
         }
+        if (opens_windows(to_.display[0]) && !has_screen()) {
+            complain(fmt::format(
+                "[DISPLAY]DISPLAY is '{}', which opens windows, and the environment has no "
+                "DISPLAY; "
+                "start it in a terminal of the desktop, or on another computer after: ssh -X",
+                to_.display[0]));
+            return false;
+        }
         for (const Words& application : to_.applications) {
             if (!application.empty() && find_program(to_, application[0]).empty()) {
                 return missing("[APPLICATIONS]APP", application[0]);
@@ -212,6 +221,20 @@ private:
             if (executable(folder + "/" + name)) return folder + "/" + name;
         }
         return {};
+    }
+
+    /// Whether a display is one of LinuxCNC's that need a screen.
+    static bool opens_windows(const std::string& program) {
+        static constexpr std::string_view all[] = {"axis",  "gmoccapy", "gscreen",   "mdro",
+                                                   "qtvcp", "touchy",   "tklinuxcnc"};
+        return std::ranges::find(all, program) != std::end(all);
+    }
+    static bool has_screen() {
+        const auto is_set = [](const char* name) {
+            const char* const text = std::getenv(name);
+            return text != nullptr && *text != '\0';
+        };
+        return is_set("DISPLAY") || is_set("WAYLAND_DISPLAY");
     }
 
     bool missing(const char* key, const std::string& program) {
