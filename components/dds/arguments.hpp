@@ -133,13 +133,18 @@ public:
     }
     TopicType topic(const Schema& schema) const {
         std::string wire = topic_.get();
+        std::string shown = wire;
         if (!schema.prefix.empty()) {
-            wire = schema.prefix + wire.substr(std::min(wire.find_first_not_of('/'), wire.size()));
+            const std::string name =
+                wire.substr(std::min(wire.find_first_not_of('/'), wire.size()));
+            wire = schema.prefix + name;
+            shown = "/" + name;
         }
         return {wire, schema.type,
                 schema.ros == "sensor_msgs/JointState" || schema.ros == "sensor_msgs/Image"
                     ? 65'536
-                    : schema.sample.size()};
+                    : schema.sample.size(),
+                shown};
     }
     Quality quality() const {
         constexpr std::int64_t ms = 1'000'000;

@@ -68,6 +68,7 @@ struct TopicType {
     std::string name;  ///< on the wire: "rt/hal/float" for ROS 2's /hal/float
     std::string type;  ///< on the wire: "std_msgs::msg::dds_::Float64_"; equal at both ends
     std::size_t max;  ///< bytes of the largest sample, header included
+    std::string shown = {};  ///< in messages: "/hal/float", as ROS 2 names it
 };
 
 /// A received sample. Its bytes are valid during the callback.

@@ -66,7 +66,7 @@ class Topics(DdsCase):
         self.becomes("j.valid", "FALSE")
         self.assertRegex(
             self.shell("show", "fault", instance="subscriber").stdout,
-            r"j: no value of joint 'c' in topic 'rt/js' for 0\.\d+ s \(timeout 500 ms\)",
+            r"j: no value of joint 'c' in topic '/js' for 0\.\d+ s \(timeout 500 ms\)",
         )
 
     def test_a_killed_publisher_makes_the_pins_invalid_and_its_successor_makes_them_valid(self):

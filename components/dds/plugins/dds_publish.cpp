@@ -137,7 +137,7 @@ private:
     void on_event(Event e, int count, const std::string& text) noexcept override {
         connection_.handle(
             arguments_, e, count, text,
-            "topic '" + topic_.name + "': a subscriber requests a QoS that is not offered: ");
+            "topic '" + topic_.shown + "': a subscriber requests a QoS that is not offered: ");
     }
 
     Arguments arguments_{*this};

@@ -45,10 +45,10 @@ public:
             timeout_ = timeout_ms_ * 1'000'000;
         }
         const std::string limit = std::to_string(timeout_ / 1'000'000) + " ms";
-        stale_text_ = "no sample of topic '" + topic_.name + "' for {} s (timeout " + limit +
+        stale_text_ = "no sample of topic '" + topic_.shown + "' for {} s (timeout " + limit +
                       "); its pins are not valid";
         for (const std::string& joint : schema_.names) {
-            joint_texts_.push_back("no value of joint '" + joint + "' in topic '" + topic_.name +
+            joint_texts_.push_back("no value of joint '" + joint + "' in topic '" + topic_.shown +
                                    "' for {} s (timeout " + limit +
                                    "); the pins of the topic are not valid");
         }
@@ -197,7 +197,7 @@ private:
         }
         if (!decode(schema_, s.bytes, message_.values, has_joint_)) {
             if (malformed_.fetch_add(1, std::memory_order_relaxed) == 0) {
-                arguments_.log("topic '" + topic_.name + "': dropped a malformed sample of " +
+                arguments_.log("topic '" + topic_.shown + "': dropped a malformed sample of " +
                                std::to_string(s.bytes.size()) + " bytes; expected type " +
                                topic_.type + ", final, " + std::to_string(schema_.sample.size()) +
                                " bytes: compare the fields of both sides");
@@ -237,7 +237,7 @@ private:
         const bool floods = rate_ > static_cast<double>(flood_limit_);
         if (floods != flood_.load(std::memory_order_relaxed)) {
             arguments_.log(
-                "topic '" + topic_.name + "': " + (floods ? "flood of " : "flood ended: ") +
+                "topic '" + topic_.shown + "': " + (floods ? "flood of " : "flood ended: ") +
                 std::to_string(std::llround(rate_)) +
                 " samples per second (flood_limit=" + std::to_string(flood_limit_) + ")" +
                 (floods ? "; only one of 16 samples above the limit is decoded" : ""));
@@ -250,11 +250,11 @@ private:
         std::snprintf(seconds, sizeof seconds, "%.3f",
                       std::abs(static_cast<double>(transit)) * 1e-9);
         if (clock_differed_) {
-            arguments_.log("topic '" + topic_.name + "': the publisher's clock is " + seconds +
+            arguments_.log("topic '" + topic_.shown + "': the publisher's clock is " + seconds +
                            " s " + (transit < 0 ? "ahead of" : "behind") +
                            " this machine's; age-ms now counts from the reception of a sample");
         } else {
-            arguments_.log("topic '" + topic_.name +
+            arguments_.log("topic '" + topic_.shown +
                            "': the publisher's clock agrees with this machine's again");
         }
     }
@@ -262,7 +262,7 @@ private:
     void on_event(Event e, int count, const std::string& text) noexcept override {
         connection_.handle(
             arguments_, e, count, text,
-            "topic '" + topic_.name + "': a publisher does not offer the requested QoS: ");
+            "topic '" + topic_.shown + "': a publisher does not offer the requested QoS: ");
     }
 
     /// Reports what the cycle found, and publishers that send nothing. A lost publisher is reported
@@ -270,7 +270,7 @@ private:
     std::int64_t serve(std::int64_t now) noexcept override {
         const State s = state_.load(std::memory_order_relaxed);
         if (s == State::valid && reported_ == State::stale) {
-            arguments_.log("topic '" + topic_.name + "' is valid again");
+            arguments_.log("topic '" + topic_.shown + "' is valid again");
         }
         reported_ = s;
         const bool second_one = other_at_.load(std::memory_order_relaxed) > now - second;
@@ -280,7 +280,7 @@ private:
             const auto other = other_named_;
             lock.unlock();
             arguments_.log(
-                "topic '" + topic_.name + "': second publisher " + connection_.describe(other) +
+                "topic '" + topic_.shown + "': second publisher " + connection_.describe(other) +
                 " in addition to " + connection_.describe(owner) +
                 (exclusive_
                      ? "; its samples are ignored: stop it, or accept all publishers by exclusive=0"
@@ -295,7 +295,7 @@ private:
         const std::int64_t since = std::max(last_.load(std::memory_order_relaxed), quiet_since_);
         const bool quiet = has_publisher && now - since > silence_ms_ * 1'000'000;
         if (quiet && !silent_.load(std::memory_order_relaxed)) {
-            arguments_.log("topic '" + topic_.name +
+            arguments_.log("topic '" + topic_.shown +
                            "': no sample from the matched publisher for " +
                            std::to_string(silence_ms_) +
                            " ms; check that it is enabled, that its data representation is XCDR1, "
@@ -319,7 +319,7 @@ private:
         }
         if (now - missing_since_ < silence_ms_ * 1'000'000 || reported_joint_ == missing) return;
         reported_joint_ = missing;
-        arguments_.log("topic '" + topic_.name + "': no sample contains joint '" +
+        arguments_.log("topic '" + topic_.shown + "': no sample contains joint '" +
                        schema_.names[static_cast<std::size_t>(missing)] +
                        "'; compare joints= with the names that its publishers send");
     }
@@ -402,7 +402,7 @@ private:
     const bool exclusive_ =
         exclusive_argument_ == 1 || (exclusive_argument_ == -1 && schema_.ros.empty());
     const std::string second_text_ =
-        "a second publisher writes topic '" + topic_.name + "'; its samples are ignored";
+        "a second publisher writes topic '" + topic_.shown + "'; its samples are ignored";
     // The engine's threads', one at a time
     Message message_{{}, std::vector<hal_value>(schema_.fields.size())};
     std::array<std::uint8_t, 16> writer_{}, owner_{};
