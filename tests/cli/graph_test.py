@@ -222,7 +222,10 @@ net back d.out => a.in0
     def test_the_drawing_in_the_documentation_is_that_of_its_netlist(self):
         netlist = "halfiles/furuta/hang.hal"
         drawn = subprocess.run(
-            [str(HAL), "graph", netlist, "-o", str(self.folder / "furuta.svg")],
+            [
+                *(str(HAL), "graph", netlist, "--pins", "linked"),
+                *("-o", str(self.folder / "furuta.svg")),
+            ],
             cwd=ROOT,
             env=self.environment,
             stderr=subprocess.PIPE,
@@ -235,7 +238,7 @@ net back d.out => a.in0
         self.assertEqual(
             sorted(texts[0]),
             sorted(texts[1]),
-            f"draw it again: hal graph {netlist} -o docs/furuta.svg",
+            f"draw it again: hal graph {netlist} --pins linked -o docs/furuta.svg",
         )
 
     def test_names_are_escaped(self):
