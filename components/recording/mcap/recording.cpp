@@ -69,6 +69,9 @@ bool is_joint_state(const Reader& reader, const Channel& channel) {
            schema->second.name == "sensor_msgs/msg/JointState";
 }
 
+/// What a journal has for its own execution, beside the values.
+bool is_of_journal(const Channel& channel) { return channel.topic.starts_with("/hal/journal/"); }
+
 constexpr const char* supported = "; CDR messages with a 'ros2msg' schema are";
 
 /// Adds a sentence to those about what is not read, or counts it when there are many.
@@ -192,7 +195,9 @@ private:
         if (to_.unread.empty()) {
             to_.unread = sentence + supported;
         }
-        skipped_.add(sentence);
+        if (!is_of_journal(channel)) {
+            skipped_.add(sentence);
+        }
     }
 
     bool add_row(Row& row, const Message& message) {
