@@ -455,6 +455,10 @@ class Running(Case):
             "--dds: invalid setting 'foo'; use KEY=VALUE with one of the keys: domain",
             self.bad("run", self.path, "--node", "taker", "--dds", "domain=3 foo"),
         )
+        self.assertIn(
+            "--dds takes settings KEY=VALUE before --for; without any, leave out --dds",
+            self.bad("run", self.path, "--node", "taker", "--dds", "--for"),
+        )
 
     def test_rejects_a_second_instance_of_a_node(self):
         self.node("taker")

@@ -30,6 +30,13 @@ class WithoutDds(Case):
             (done.returncode, done.stderr),
         )
 
+    def test_an_option_in_the_place_of_the_settings_is_named(self):
+        done = subprocess.run([HAL, "top", "--dds", "--once"], capture_output=True, text=True)
+        self.assertEqual(
+            "hal top: --dds takes settings KEY=VALUE before --once; without any, leave out --dds\n",
+            done.stderr,
+        )
+
 
 class Top(Case):
     def setUp(self):

@@ -144,7 +144,8 @@ std::string problem_of_spelling(const std::string& kind, const std::string& name
     if (!plain || name.empty() || !is_letter(name.front()) || name.back() == '-' ||
         name.back() == '_') {
         return fmt::format(
-            "invalid {0} name '{1}': use a letter, then letters, digits, - and _; try: hal new {0} {2}",
+            "invalid {0} name '{1}': use a letter, then letters, digits, - and _; try: hal new {0} "
+            "{2}",
             kind, name, repaired(name));
     }
     if (name.size() > max) {
@@ -252,9 +253,10 @@ std::string create(const NewOptions& options, const fs::path& folder,
     std::error_code problem;
     const bool there = fs::exists(fs::symlink_status(folder, problem));
     if (there && !(fs::is_directory(folder, problem) && fs::is_empty(folder, problem))) {
-        return fmt::format("'{0}' exists already; give the new {1} another folder: hal new {1} {2} "
-                           "--folder DIR",
-                           folder.string(), options.words[0], options.words[1]);
+        return fmt::format(
+            "'{0}' exists already; give the new {1} another folder: hal new {1} {2} "
+            "--folder DIR",
+            folder.string(), options.words[0], options.words[1]);
     }
     fs::create_directories(folder, problem);
     if (problem) return fmt::format("cannot create '{}': {}", folder.string(), problem.message());
@@ -270,9 +272,10 @@ std::string create(const NewOptions& options, const fs::path& folder,
 int new_component(const NewOptions& options, const fs::path& folder) {
     const std::string& name = options.words[1];
     if (options.axes != 0 || !options.bus.empty()) {
-        return fail(options, fmt::format("--axes and --bus are of a machine; type: hal new component "
-                                         "{0}, or hal new machine {0} with them",
-                                         name));
+        return fail(options,
+                    fmt::format("--axes and --bus are of a machine; type: hal new component "
+                                "{0}, or hal new machine {0} with them",
+                                name));
     }
     if (const std::string why = problem_of_component(name); !why.empty()) return fail(options, why);
     const std::string package = package_hint();
@@ -288,7 +291,8 @@ int new_component(const NewOptions& options, const fs::path& folder) {
         print(fmt::format("{0}: {1}.cpp, CMakeLists.txt, test.hal and its expected output\n"
                           "  cd {0}\n"
                           "  cmake -B build && cmake --build build && ctest --test-dir build\n"
-                          "To load it: HALCYON_PLUGIN_PATH=build hal doc {1}; to install it: "
+                          "To run it: HALCYON_PLUGIN_PATH=build hal sim test.hal; its manual page: "
+                          "HALCYON_PLUGIN_PATH=build hal doc {1}; to install it: "
                           "hal compile {1}.cpp\n",
                           shell_word(folder.string()), name)));
 }
@@ -338,9 +342,9 @@ constexpr Kind kinds[] = {{"component", new_component}, {"machine", new_machine}
 
 int run_new(const NewOptions& options) {
     const auto& words = options.words;
-    const auto* const kind =
-        std::find_if(std::begin(kinds), std::end(kinds),
-                     [&](const Kind& one) { return !words.empty() && words[0] == one.name; });
+    const auto* const kind = std::find_if(std::begin(kinds), std::end(kinds), [&](const Kind& one) {
+        return !words.empty() && words[0] == one.name;
+    });
     if (kind == std::end(kinds)) {
         const bool may_be_name =
             words.size() == 1 && problem_of_spelling("component", words[0]).empty();
@@ -353,10 +357,10 @@ int run_new(const NewOptions& options) {
         return fail(options, fmt::format("missing name; type: hal new {} NAME", kind->name));
     }
     if (words.size() > 2) {
-        return fail(options, fmt::format("expected one name, not {}; a name contains no blanks: "
-                                         "hal new {} {}",
-                                         words.size() - 1, kind->name,
-                                         repaired(words[1] + "-" + words[2])));
+        return fail(options,
+                    fmt::format("expected one name, not {}; a name contains no blanks: "
+                                "hal new {} {}",
+                                words.size() - 1, kind->name, repaired(words[1] + "-" + words[2])));
     }
     return kind->create(options, options.folder.empty() ? words[1] : options.folder);
 }

@@ -124,6 +124,7 @@ bool several(const Page& page) { return page.functions.size() > 1; }
 
 std::string synopsis(const Page& page) {
     std::string line = "loadrt " + page.name;
+    std::replace(line.begin(), line.end(), '-', '_');  // the name of the file
     if (!page.singleton) {
         line += " [count=N | names=NAME,…]";
     }

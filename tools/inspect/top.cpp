@@ -246,6 +246,11 @@ int run_top(const TopOptions& options) {
         settings.empty() && usual != nullptr) {
         settings = usual;
     }
+    if (options.dds.starts_with("--")) {
+        return fail(options, fmt::format("--dds takes settings KEY=VALUE before {}; without any, "
+                                         "leave out --dds",
+                                         options.dds));
+    }
     const bool live = has_screen() && !options.json && !options.once;
     std::optional<StopRequest> stop;
     if (live) {

@@ -64,6 +64,13 @@ std::optional<std::vector<std::string>> dds_settings(const Options& options,
             words.push_back(word);
             continue;
         }
+        if (word.starts_with("--")) {
+            fail(options,
+                 fmt::format("--dds takes settings KEY=VALUE before {}; without any, leave "
+                             "out --dds",
+                             word));
+            return std::nullopt;
+        }
         fail(options,
              fmt::format("--dds: invalid setting '{}'; use KEY=VALUE with one of the keys: {}",
                          word, fmt::join(keys, " ")));
