@@ -135,10 +135,10 @@ public:
         std::string wire = topic_.get();
         std::string shown = wire;
         if (!schema.prefix.empty()) {
-            const std::string name =
+            const std::string plain =
                 wire.substr(std::min(wire.find_first_not_of('/'), wire.size()));
-            wire = schema.prefix + name;
-            shown = "/" + name;
+            wire = schema.prefix + plain;
+            shown = "/" + plain;
         }
         return {wire, schema.type,
                 schema.ros == "sensor_msgs/JointState" || schema.ros == "sensor_msgs/Image"

@@ -37,6 +37,11 @@ class Reference(Case):
     def names(self):
         return [line.split()[0] for line in self.good("doc").splitlines()]
 
+    def test_the_synopsis_has_the_name_of_the_file(self):
+        self.assertIn("loadrt and2 [", self.good("doc", "and2"))
+        self.assertIn("loadrt conv_bit_float [", self.good("doc", "conv_bit_float"))
+        self.assertIn("loadrt safety_switch [", self.good("doc", "safety_switch"))
+
     def test_web_pages_are_whole_and_need_nothing_else(self):
         self.assertEqual("", self.good("doc", "--all", "--output", "pages"))
         folder = self.folder / "pages"
