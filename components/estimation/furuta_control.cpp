@@ -11,6 +11,8 @@
 
 namespace {
 
+using hal::estimation::FurutaParameters;
+
 enum class Phase : std::uint32_t { off, swing_up, balance };
 
 struct FurutaControl : hal::Component {
@@ -223,30 +225,47 @@ private:
         return std::isfinite(relative) ? relative : 0.0;
     }
 
-    /// Sets the rig to that of the parameters, or to the one identified from its motion, and
-    /// `homed`. A pendulum that does not hang at 0 is not driven, because every torque would be
-    /// computed for a wrong angle. A rising edge of `enable` restarts the identification.
+    /// Sets the rig to that of the parameters or, with `identify`, to the one identified from its
+    /// motion, and `homed`.
     void update_rig(const State& s, double dt) noexcept {
-        const hal::estimation::FurutaParameters given{arm_inertia, swing_inertia, coupling,
-                                                      weight_moment, friction};
-        const bool usable = given.arm_inertia > 0.0 && given.pendulum_inertia > 0.0 &&
-                            given.coupling > 0.0 && given.weight_moment > 0.0;
-        if (!identify || !usable) {
-            rig_ = given;
+        const FurutaParameters nominal{arm_inertia, swing_inertia, coupling, weight_moment,
+                                       friction};
+        if (!identify || !is_physical(nominal)) {
+            rig_ = nominal;
             homed = true;
             identification_ = {};
             return;
         }
-        const bool enabled_now = enable && !enabled_;
-        enabled_ = enable;
-        const bool has_new_rig = given != identification_.nominal() || dt != identification_.dt();
-        if (has_new_rig || (enabled_now && !homed)) {
-            identification_.restart(given, dt);
-            homed = true;
-        }
+        restart_identification(nominal, dt);
         identification_.add({arm_angle, s.pendulum, s.arm_speed, s.pendulum_speed, torque},
                             pendulum_age, now_ == Phase::swing_up);
         rig_ = identification_.estimate();
+        check_zero();
+        zero_offset = identification_.zero_offset();
+        identified_frequency = std::sqrt(rig_.weight_moment / rig_.pendulum_inertia);
+    }
+
+    static bool is_physical(const FurutaParameters& rig) noexcept {
+        return rig.arm_inertia > 0.0 && rig.pendulum_inertia > 0.0 && rig.coupling > 0.0 &&
+               rig.weight_moment > 0.0;
+    }
+
+    /// Restarts the identification for other parameters or another period, and when `enable` rises
+    /// after the zero of the pendulum was found wrong.
+    void restart_identification(const FurutaParameters& nominal, double dt) noexcept {
+        const bool enable_rises = enable && !was_enabled_;
+        was_enabled_ = enable;
+        const bool is_other_rig =
+            nominal != identification_.nominal() || dt != identification_.dt();
+        if (is_other_rig || (enable_rises && !homed)) {
+            identification_.restart(nominal, dt);
+            homed = true;
+        }
+    }
+
+    /// Ends `homed` if the pendulum does not hang at 0, because every torque would be computed for
+    /// a wrong angle. The fault lasts until the identification restarts, or `enable` is FALSE.
+    void check_zero() noexcept {
         if (homed && enable && identification_.zero_is_wrong()) {
             homed = false;
             fault_.begin(faults_, this,
@@ -255,12 +274,10 @@ private:
                          "then set enable to FALSE and TRUE",
                          identification_.zero_offset());
         }
-        // without enable there is no torque
-        if ((homed || !enable) && fault_.lasts()) {
+        const bool is_torque_withheld = enable && !homed;
+        if (!is_torque_withheld && fault_.lasts()) {
             fault_.end(faults_, this);
         }
-        zero_offset = identification_.zero_offset();
-        identified_frequency = std::sqrt(rig_.weight_moment / rig_.pendulum_inertia);
     }
 
     void choose_phase(double tilt, const State& s) noexcept {
@@ -393,17 +410,17 @@ private:
 
     Phase now_ = Phase::off;
     double upright_s_ = 0.0;
-    bool enabled_ = false;
+    bool was_enabled_ = false;
 
     const hal_faults* faults_ = nullptr;
     hal::LastingFault fault_;
 
-    hal::estimation::FurutaParameters rig_;
+    FurutaParameters rig_;
     hal::estimation::FurutaIdentification identification_;
     hal::Retained retained_{*this,
                             {{"now", now_},
                              {"upright-s", upright_s_},
-                             {"enabled", enabled_},
+                             {"enabled", was_enabled_},
                              {"rig", rig_},
                              {"identification", identification_}}};
 };

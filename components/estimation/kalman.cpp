@@ -2,6 +2,8 @@
 #include <Eigen/LU>
 #include <cmath>
 #include <deque>
+#include <optional>
+#include <string>
 
 #include "estimation/channels.hpp"
 #include "estimation/design/plant.hpp"
@@ -37,19 +39,156 @@ struct Linear {
     }
 };
 
+/// The plant of the load arguments: x(k+1) = Ax + Bu + w or x' = Ax + Bu + w, z = Cx + v.
+struct KalmanPlant {
+    Time time = Time::discrete;
+    Matrix a, b;
+    Dense c;
+    Matrix q;   ///< covariance of w; its density if the time is continuous
+    Dense r;    ///< covariance of v
+    Vector x0;  ///< initial estimate of x
+    Matrix p0;  ///< covariance of the initial estimate
+};
+
+Time parse_time(const std::string& text) {
+    if (text == "continuous") return Time::continuous;
+    if (text == "discrete") return Time::discrete;
+    throw hal::ArgumentError("plant", "plant=" + text + " is neither continuous nor discrete");
+}
+
+/// Returns a covariance of noise on the states; an element may be 0.
+Dense state_covariance(const Matrices& matrices, const char* name, Eigen::Index states) {
+    const Dense m = matrices.symmetric(name, states, "it has a row and a column per state",
+                                       "a covariance matrix is symmetric");
+    if (!m.isZero() && !is_positive_semidefinite(m)) {
+        matrices.refuse(name, std::string(name) + " has a negative eigenvalue",
+                        "a covariance matrix is positive semidefinite");
+    }
+    return m;
+}
+
+/// Returns the covariance of the noise on the measurements; all have noise.
+Dense measurement_covariance(const Matrices& matrices, const char* name,
+                             Eigen::Index measurements) {
+    const Dense m = matrices.symmetric(name, measurements,
+                                       "it has a row and a column per measurement, as C has rows",
+                                       "a covariance matrix is symmetric");
+    if (!is_positive_definite(m)) {
+        matrices.refuse(name, std::string(name) + " is not positive",
+                        "give each measurement's variance on the diagonal, above 0");
+    }
+    return m;
+}
+
+/// Rejects a plant with an unstable mode that no measurement shows: its estimate would diverge.
+void check_detectable(const Matrices& matrices, const KalmanPlant& plant) {
+    const std::optional<Mode> mode = unseen(Dense(plant.a), plant.c, plant.time);
+    if (!mode) return;
+    matrices.refuse("C",
+                    "the plant is undetectable: no measurement shows its mode at " +
+                        text(mode->value) + ", strongest in state " + std::to_string(mode->state),
+                    "that mode is unstable, so its estimate would diverge; measure it, or "
+                    "remove the state");
+}
+
+/// Reads the load arguments of a component. Throws for an invalid one. [setup]
+KalmanPlant read_plant(hal::Component& component, const std::string& time) {
+    KalmanPlant plant;
+    plant.time = parse_time(time);
+    const Matrices matrices(
+        component, {{"A", "1,0.001;0,1", "n x n: system matrix"},
+                    {"B", "0;0.001", "n x m: input matrix; default: no inputs"},
+                    {"C", "1,0", "p x n: measurement matrix"},
+                    {"QN", "1e-12,0;0,1e-6", "n x n: covariance of the noise on the states"},
+                    {"RN", "1e-6", "p x p: covariance of the noise on the measurements"},
+                    {"P0", "", "n x n: initial covariance of the states; default: identity"},
+                    {"x0", "", "n: initial states; default: 0"}});
+    plant.a = matrices.square("A");
+    const Eigen::Index states = plant.a.rows();
+    plant.b = Dense::Zero(states, 0);
+    if (matrices.has("B")) {
+        plant.b = matrices.with_rows("B", states, "it has a row per state, as A has");
+    }
+    plant.c = matrices.with_columns("C", states, "it has a column per state, as A has");
+    plant.q = state_covariance(matrices, "QN", states);
+    plant.r = measurement_covariance(matrices, "RN", plant.c.rows());
+    plant.p0 = Matrix::Identity(states, states);
+    if (matrices.has("P0")) {
+        plant.p0 = state_covariance(matrices, "P0", states);
+    }
+    plant.x0 = Vector::Zero(states);
+    if (matrices.has("x0")) {
+        plant.x0 = matrices.vector("x0", states, "it has a number per state");
+    }
+    check_detectable(matrices, plant);
+    return plant;
+}
+
+/// For measurements z whose noises depend on each other: the noises of transform * z are
+/// independent, so that one of them can be applied after the other.
+struct Decorrelation {
+    Matrix transform;
+    Vector variances;  ///< of the noises of transform * z
+};
+
+/// R = L D L' gives the transform L^-1 and the variances D. [setup]
+Decorrelation decorrelate(const Dense& r) {
+    const Eigen::Index p = r.rows();
+    Dense l = Dense::Identity(p, p);
+    Vector d = Vector::Zero(p);
+    for (Eigen::Index j = 0; j < p; ++j) {
+        d(j) = r(j, j);
+        for (Eigen::Index k = 0; k < j; ++k) {
+            d(j) -= l(j, k) * l(j, k) * d(k);
+        }
+        for (Eigen::Index i = j + 1; i < p; ++i) {
+            double sum = r(i, j);
+            for (Eigen::Index k = 0; k < j; ++k) {
+                sum -= l(i, k) * l(j, k) * d(k);
+            }
+            l(i, j) = sum / d(j);
+        }
+    }
+    Dense inverse = Dense::Identity(p, p);
+    for (Eigen::Index i = 0; i < p; ++i) {
+        for (Eigen::Index k = 0; k < i; ++k) {
+            inverse.row(i) -= l(i, k) * inverse.row(k);
+        }
+    }
+    return {inverse, d};
+}
+
+std::optional<Decorrelation> decorrelation_of(const Dense& r) {
+    if (r.isDiagonal(1e-14)) return std::nullopt;
+    return decorrelate(r);
+}
+
+/// Returns the model of a plant, whose matrices A, B and Q are not sampled yet. [setup]
+Linear model_of(const KalmanPlant& plant, const std::optional<Decorrelation>& decorrelation) {
+    Linear model{plant.a, plant.b, plant.q, plant.c, plant.r.diagonal()};
+    if (decorrelation) {
+        model.c = Dense(decorrelation->transform) * plant.c;
+        model.r = decorrelation->variances;
+    }
+    return model;
+}
+
 class Kalman : public hal::Component {
 public:
     explicit Kalman(const hal_host* host)
         : Component(host),
-          plant_(*this, "plant", "discrete",
-                 "discrete: x(k+1) = Ax + Bu, a step per cycle; continuous: x' = Ax + Bu, QN is "
-                 "the density of its noise"),
+          time_(*this, "plant", "discrete",
+                "discrete: x(k+1) = Ax + Bu, a step per cycle; continuous: x' = Ax + Bu, QN is "
+                "the density of its noise"),
           history_(
               *this, "history", 32,
               "length of the history in cycles; measurements may be up to history - 2 cycles old",
               {.min = 3, .max = 4096}),
-          model_(read()),
-          past_(model_, static_cast<std::size_t>(history_), x0_, p0_, model_.b.cols(),
+          plant_(read_plant(*this, time_.get())),
+          decorrelation_(decorrelation_of(plant_.r)),
+          gain_of_covariance_(plant_.c.transpose() * plant_.r.inverse()),
+          model_(model_of(plant_, decorrelation_)),
+          past_(model_, static_cast<std::size_t>(history_), plant_.x0, plant_.p0, model_.b.cols(),
                 model_.c.rows()),
           u(*this, "u-#", model_.b.cols(), "input # of the plant since the previous cycle"),
           channels_(*this, model_.c.rows()),
@@ -72,7 +211,7 @@ public:
 
     void update(hal::Cycle cycle) noexcept {
         if (cycle.period_ns() != period_ns_) {
-            if (continuous_ && period_ns_ != 0) {
+            if (plant_.time == Time::continuous && period_ns_ != 0) {
                 past_.restart();
             }
             sample(cycle);
@@ -86,10 +225,10 @@ public:
             }
         }
         past_.advance(input_);
-        if (whole_ == nullptr) {
-            channels_.feed(past_, cycle);
+        if (decorrelation_) {
+            channels_.feed_decorrelated(past_, cycle, decorrelation_->transform);
         } else {
-            channels_.feed_decorrelated(past_, cycle, *whole_);
+            channels_.feed(past_, cycle);
         }
         past_.settle(std::fmax(channels_.gate, 0.0));
         channels_.show_outcome(past_, cycle);
@@ -100,120 +239,25 @@ public:
             sigma[i] = std::sqrt(std::fmax(now.p(at, at), 0.0));
         }
         if (show_gains) {
-            show(now);
+            show_gain(now);
         }
     }
 
 private:
-    /// Reads the load arguments. Throws hal::ArgumentError for an invalid one. [setup]
-    Linear read() {
-        continuous_ = plant_.get() == "continuous";
-        if (!continuous_ && plant_.get() != "discrete") {
-            throw hal::ArgumentError(
-                "plant", "plant=" + plant_.get() + " is neither continuous nor discrete");
-        }
-        const Matrices given(
-            *this, {{"A", "1,0.001;0,1", "n x n: system matrix"},
-                    {"B", "0;0.001", "n x m: input matrix; default: no inputs"},
-                    {"C", "1,0", "p x n: measurement matrix"},
-                    {"QN", "1e-12,0;0,1e-6", "n x n: covariance of the noise on the states"},
-                    {"RN", "1e-6", "p x p: covariance of the noise on the measurements"},
-                    {"P0", "", "n x n: initial covariance of the states; default: identity"},
-                    {"x0", "", "n: initial states; default: 0"}});
-        Linear model;
-        model.a = a_ = given.square("A");
-        const Eigen::Index n = model.a.rows();
-        model.b = b_ = given.has("B") ? given.at("B", n, given.at("B").value.cols(),
-                                                 "it has a row per state, as A has")
-                                      : Dense(Dense::Zero(n, 0));
-        Dense c =
-            given.at("C", given.at("C").value.rows(), n, "it has a column per state, as A has");
-        const Eigen::Index p = c.rows();
-        model.q = q_ = covariance(given, "QN", n, "it has a row and a column per state", true);
-        const Dense r = covariance(
-            given, "RN", p, "it has a row and a column per measurement, as C has rows", false);
-        p0_ = given.has("P0")
-                  ? Matrix(covariance(given, "P0", n, "it has a row and a column per state", true))
-                  : Matrix(Matrix::Identity(n, n));
-        x0_ = given.has("x0") ? Vector(given.vector("x0", n, "it has a number per state"))
-                              : Vector(Vector::Zero(n));
-        if (const auto mode =
-                unseen(Dense(model.a), c, continuous_ ? Time::continuous : Time::discrete)) {
-            given.refuse("C",
-                         "the plant is undetectable: no measurement shows its mode at " +
-                             text(mode->value) + ", strongest in state " +
-                             std::to_string(mode->state),
-                         "that mode is unstable, so its estimate would diverge; measure it, or "
-                         "remove the state");
-        }
-        shown_ = c.transpose() * r.inverse();
-        if (!r.isDiagonal(1e-14)) {
-            whole_ = &whole_matrix_;
-            whole_matrix_ = independent(r);
-        }
-        if (whole_ != nullptr) {
-            c = Dense(whole_matrix_) * c;
-        }
-        model.c = c;
-        model.r = whole_ != nullptr ? Vector(spread_) : Vector(r.diagonal());
-        return model;
-    }
-    static Dense covariance(const Matrices& given, const char* name, Eigen::Index n,
-                            const char* why, bool semi) {
-        const Dense m = given.at(name, n, n, why);
-        if ((m - m.transpose()).norm() > 1e-12 * m.norm()) {
-            given.refuse(name, std::string(name) + " is not symmetric",
-                         "a covariance matrix is symmetric");
-        }
-        if (!positive(m, semi) && !(semi && m.isZero())) {
-            given.refuse(
-                name,
-                std::string(name) + (semi ? " has a negative eigenvalue" : " is not positive"),
-                semi ? "a covariance matrix is positive semidefinite"
-                     : "give each measurement's variance on the diagonal, above 0");
-        }
-        return m;
-    }
-    /// L^-1 of R = L D L', so that the noise of L^-1 z is independent, with the variances D in
-    /// spread_.
-    Matrix independent(const Dense& r) {
-        const Eigen::Index p = r.rows();
-        Dense l = Dense::Identity(p, p);
-        Dense inverse = l;
-        spread_ = Vector::Zero(p);
-        for (Eigen::Index j = 0; j < p; ++j) {
-            double d = r(j, j);
-            for (Eigen::Index k = 0; k < j; ++k) {
-                d -= l(j, k) * l(j, k) * spread_(k);
-            }
-            spread_(j) = d;
-            for (Eigen::Index i = j + 1; i < p; ++i) {
-                double sum = r(i, j);
-                for (Eigen::Index k = 0; k < j; ++k) {
-                    sum -= l(i, k) * l(j, k) * spread_(k);
-                }
-                l(i, j) = sum / d;
-            }
-        }
-        for (Eigen::Index i = 0; i < p; ++i) {
-            for (Eigen::Index k = 0; k < i; ++k) {
-                inverse.row(i) -= l(i, k) * inverse.row(k);
-            }
-        }
-        return inverse;
-    }
+    /// Samples a continuous plant for the period of the cycle. [realtime]
     void sample(hal::Cycle cycle) noexcept {
         period_ns_ = cycle.period_ns();
-        if (!continuous_) return;
-        model_.a = a_;
-        model_.b = b_;
-        model_.q = q_;
+        if (plant_.time == Time::discrete) return;
+        model_.a = plant_.a;
+        model_.b = plant_.b;
+        model_.q = plant_.q;
         hold_.sample(model_.a, model_.b, cycle.seconds());
-        hold_.sample_noise(a_, model_.q, cycle.seconds());
+        hold_.sample_noise(plant_.a, model_.q, cycle.seconds());
     }
-    void show(const Moment& now) noexcept {
+    /// Shows the gain P C' R^-1 of the measurements as they are given. [realtime]
+    void show_gain(const Moment& now) noexcept {
         Matrix gain;
-        multiply(gain, now.p, shown_);
+        multiply(gain, now.p, gain_of_covariance_);
         for (Eigen::Index i = 0, k = 0; i < gain.rows(); ++i) {
             for (Eigen::Index j = 0; j < gain.cols(); ++j, ++k) {
                 gains_[static_cast<std::size_t>(k)] = gain(i, j);
@@ -221,13 +265,13 @@ private:
         }
     }
 
-    hal::TextArgument plant_;
+    hal::TextArgument time_;
     hal::Argument history_;
-    bool continuous_ = false;
-    Vector x0_, spread_, input_;
-    Matrix a_, b_, q_, p0_, shown_, whole_matrix_;
-    // set: the measurements' noises depend on each other, only all of them together can be taken
-    const Matrix* whole_ = nullptr;
+    const KalmanPlant plant_;
+    // if the noises depend on each other: the measurements of a cycle are applied all or not at all
+    const std::optional<Decorrelation> decorrelation_;
+    const Matrix gain_of_covariance_;  // C' R^-1: the gain is that behind the covariance P
+    Vector input_;
     Linear model_;
     Past<Linear> past_;
     Hold hold_;

@@ -34,6 +34,77 @@ struct Problem {
     }
 };
 
+Plant parse_plant(const std::string& text) {
+    if (text == "continuous") return Plant::continuous;
+    if (text == "discrete") return Plant::discrete;
+    if (text == "sampled") return Plant::sampled;
+    throw hal::ArgumentError("plant", "plant=" + text + " is not continuous, sampled or discrete");
+}
+
+void check_period(double period_s) {
+    if (period_s > 0.0 && period_s <= 3600.0) return;
+    throw hal::ArgumentError("period",
+                             "period= is not between 0 and 3600 s; write the thread's "
+                             "period in s, 0.001 for one of 1 ms");
+}
+
+/// Rejects weights without a stabilising solution: Q is positive semidefinite, R positive definite.
+void check_weights(const Matrices& matrices, const Problem& problem) {
+    if (!is_positive_semidefinite(problem.q)) {
+        matrices.refuse("Q", "Q has a negative eigenvalue",
+                        "start with diag and a number per state, 0 or above");
+    }
+    if (!is_positive_definite(problem.r)) {
+        matrices.refuse("R", "R is not positive", "start with diag and 1 per input");
+    }
+}
+
+/// Formats "0.5, strongest in state 1".
+std::string mode_text(const Mode& mode) {
+    return text(mode.value) + ", strongest in state " + std::to_string(mode.state);
+}
+
+/// Rejects a plant with an unstable mode that no input controls or no weight observes.
+void check_stabilisable(const Matrices& matrices, const Problem& problem) {
+    const Time time = problem.plant == Plant::discrete ? Time::discrete : Time::continuous;
+    if (const auto mode = unreachable(problem.a, problem.b, time)) {
+        matrices.refuse(
+            "B", "the plant is uncontrollable: no input reaches its mode at " + mode_text(*mode),
+            "that mode is unstable; look at row " + std::to_string(mode->state + 1) +
+                " of A and B");
+    }
+    if (const auto mode = unseen(problem.a, problem.q, time)) {
+        matrices.refuse("Q", "the cost does not observe the plant's mode at " + mode_text(*mode),
+                        "give that state a weight in Q");
+    }
+}
+
+/// Reads the matrices of a component, as load arguments or in a file. Throws for an invalid one.
+/// [setup]
+Problem read_problem(hal::Component& component, const std::string& plant, double period_s) {
+    Problem problem;
+    problem.plant = parse_plant(plant);
+    check_period(period_s);
+    problem.period = period_s;
+    const Matrices matrices(
+        component, {{"A", "0,1;0,0", "n x n: system matrix"},
+                    {"B", "0;1", "n x m: input matrix"},
+                    {"Q", "1,0;0,1", "n x n: cost of the states; symmetric, positive semidefinite"},
+                    {"R", "1", "m x m: cost of the inputs; symmetric, positive definite"}});
+    problem.a = matrices.square("A");
+    const Eigen::Index states = problem.a.rows();
+    problem.b = matrices.with_rows("B", states, "it has a row per state, as A has");
+    const Eigen::Index inputs = problem.b.cols();
+    problem.q = matrices.symmetric("Q", states, "it has a row and a column per state",
+                                   "a cost matrix is symmetric");
+    problem.r =
+        matrices.symmetric("R", inputs, "it has a row and a column per input, as B has columns",
+                           "a cost matrix is symmetric");
+    check_weights(matrices, problem);
+    check_stabilisable(matrices, problem);
+    return problem;
+}
+
 /// The current weights, from the cycle to the helper thread, and the resulting gain.
 struct Order {
     Vector q, r;
@@ -91,7 +162,8 @@ private:
             problem.q.diagonal() = order.q;
             problem.r.diagonal() = order.r;
             problem.period = static_cast<double>(order.period_ns) * 1e-9;
-            if (!positive(problem.q, true) || !positive(problem.r)) return delivery;
+            if (!is_positive_semidefinite(problem.q)) return delivery;
+            if (!is_positive_definite(problem.r)) return delivery;
             if (const auto solved = problem.solve()) {
                 delivery.gain = solved->gain;
                 delivery.good = finite(delivery.gain);
@@ -116,7 +188,7 @@ public:
           period_(*this, "period", 0.001,
                   "sampled: the thread's period in s, so that the gain is available in the first "
                   "cycle"),
-          problem_(read()),
+          problem_(read_problem(*this, plant_.get(), period_)),
           x(*this, "x-#", problem_.a.rows(), "state #"),
           target(*this, "target-#", problem_.a.rows(), "target of state #"),
           u(*this, "u-#", problem_.b.cols(), "command for input #", {.safe = 0.0, .finite = true}),
@@ -195,65 +267,6 @@ private:
         return std::string(what) + "-" + std::to_string(i);
     }
 
-    /// Reads the load arguments. Throws hal::ArgumentError for an invalid one. [setup]
-    Problem read() {
-        Problem p;
-        if (plant_.get() == "discrete") {
-            p.plant = Plant::discrete;
-        } else if (plant_.get() == "sampled") {
-            p.plant = Plant::sampled;
-        } else if (plant_.get() != "continuous") {
-            throw hal::ArgumentError(
-                "plant", "plant=" + plant_.get() + " is not continuous, sampled or discrete");
-        }
-        p.period = period_;
-        if (!(p.period > 0.0 && p.period <= 3600.0)) {
-            throw hal::ArgumentError("period",
-                                     "period= is not between 0 and 3600 s; write the thread's "
-                                     "period in s, 0.001 for one of 1 ms");
-        }
-        const Matrices given(
-            *this, {{"A", "0,1;0,0", "n x n: system matrix"},
-                    {"B", "0;1", "n x m: input matrix"},
-                    {"Q", "1,0;0,1", "n x n: cost of the states; symmetric, positive semidefinite"},
-                    {"R", "1", "m x m: cost of the inputs; symmetric, positive definite"}});
-        p.a = given.square("A");
-        const Eigen::Index n = p.a.rows();
-        p.b = given.at("B", n, given.at("B").value.cols(), "it has a row per state, as A has");
-        p.q = given.at("Q", n, n, "it has a row and a column per state");
-        p.r = given.at("R", p.b.cols(), p.b.cols(),
-                       "it has a row and a column per input, as B has columns");
-        for (const char* symmetric : {"Q", "R"}) {
-            if (const Dense& m = given.at(symmetric).value;
-                (m - m.transpose()).norm() > 1e-12 * m.norm()) {
-                given.refuse(symmetric, std::string(symmetric) + " is not symmetric",
-                             "a cost matrix is symmetric");
-            }
-        }
-        if (!positive(p.q, true)) {
-            given.refuse("Q", "Q has a negative eigenvalue",
-                         "start with diag and a number per state, 0 or above");
-        }
-        if (!positive(p.r)) {
-            given.refuse("R", "R is not positive", "start with diag and 1 per input");
-        }
-        const Time time = p.plant == Plant::discrete ? Time::discrete : Time::continuous;
-        if (const auto mode = unreachable(p.a, p.b, time)) {
-            given.refuse("B",
-                         "the plant is uncontrollable: no input reaches its mode at " +
-                             text(mode->value) + ", strongest in state " +
-                             std::to_string(mode->state),
-                         "that mode is unstable; look at row " + std::to_string(mode->state + 1) +
-                             " of A and B");
-        }
-        if (const auto mode = unseen(p.a, p.q, time)) {
-            given.refuse("Q",
-                         "the cost does not observe the plant's mode at " + text(mode->value) +
-                             ", strongest in state " + std::to_string(mode->state),
-                         "give that state a weight in Q");
-        }
-        return p;
-    }
     void take_delivery() noexcept {
         bool fresh = false;
         const Delivery& newest = designer_.deliveries.get(&fresh);

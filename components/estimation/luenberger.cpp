@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include <cmath>
 #include <complex>
+#include <optional>
+#include <string>
 
 #include "estimation/design/plant.hpp"
 #include "estimation/matrices.hpp"
@@ -11,17 +13,79 @@ namespace {
 
 using namespace hal::estimation;
 
+/// x(k+1) = Ax + Bu, corrected by L (z - C x(k+1)).
+struct Observer {
+    Matrix a, b, c, l;
+    Vector x0;  ///< initial x
+};
+
+/// Returns the gain that the user gives. The correction follows the prediction: the error is
+/// multiplied by (I - LC) A per step, which has to be stable.
+Dense read_gain(const Matrices& matrices, const Dense& a, const Dense& c) {
+    const Dense l =
+        matrices.at("L", a.rows(), c.rows(), "it has a row per state and a column per measurement");
+    const double radius = spectral_radius(a - l * c * a);
+    if (radius >= 1.0) {
+        matrices.refuse("L",
+                        "with this gain the observer is unstable: its largest pole is " +
+                            std::to_string(radius),
+                        "use poles= instead of L=");
+    }
+    return l;
+}
+
+/// Returns the gain that gives the error the poles of the user.
+Dense place_gain(const Matrices& matrices, const Dense& a, const Dense& c) {
+    const Eigen::VectorXd poles = matrices.vector("poles", a.rows(), "one for each state");
+    if (poles.cwiseAbs().maxCoeff() >= 1.0) {
+        matrices.refuse("poles", "a pole is outside of the unit circle",
+                        "use poles between 0 and 1: 0 settles in one cycle, 0.99 in some hundred");
+    }
+    const std::optional<Dense> l = place_observer(a, c * a, poles.cast<std::complex<double>>());
+    if (!l) {
+        matrices.refuse("C",
+                        "the plant is not observable, or a pole of the observer is one of its own",
+                        "look at C, or change the poles slightly");
+    }
+    return *l;
+}
+
+/// Reads the load arguments. Throws for an invalid one. [setup]
+Observer read_observer(hal::Component& component) {
+    const Matrices matrices(component, {{"A", "1,0.001;0,1", "n x n: x(k+1) = Ax + Bu"},
+                                        {"B", "0;0.001", "n x m; default: no inputs"},
+                                        {"C", "1,0", "p x n: z = Cx"},
+                                        {"L", "", "n x p: gain; alternatively poles"},
+                                        {"poles", "0.95,0.9",
+                                         "n: poles of the error; real, inside of the unit circle; "
+                                         "distinct if there is one measurement"},
+                                        {"x0", "", "n: initial states; default: 0"}});
+    const Dense& a = matrices.square("A");
+    const Eigen::Index states = a.rows();
+    Dense b = Dense::Zero(states, 0);
+    if (matrices.has("B")) {
+        b = matrices.with_rows("B", states, "it has a row per state, as A has");
+    }
+    const Dense c = matrices.with_columns("C", states, "it has a column per state, as A has");
+    Vector x0 = Vector::Zero(states);
+    if (matrices.has("x0")) {
+        x0 = matrices.vector("x0", states, "it has a number per state");
+    }
+    const Dense l = matrices.has("L") ? read_gain(matrices, a, c) : place_gain(matrices, a, c);
+    return {a, b, c, l, x0};
+}
+
 class Luenberger : public hal::Component {
 public:
     explicit Luenberger(const hal_host* host)
         : Component(host),
-          model_(read()),
+          model_(read_observer(*this)),
           u(*this, "u-#", model_.b.cols(), "input # of the plant since the previous cycle"),
           z(*this, "z-#", model_.c.rows(), "measurement #"),
           x(*this, "x-#", model_.a.rows(), "state #, estimated", {.finite = true}),
           innovation(*this, "innovation-#", model_.c.rows(),
                      "measurement # minus its expected value") {
-        state_ = start_;
+        state_ = model_.x0;
         hal::Retained(*this, {{"state", state_}});
     }
 
@@ -47,12 +111,12 @@ public:
         multiply(corrected, model_.l, off);
         next += corrected;
         if (reset) {
-            next = start_;
+            next = model_.x0;
         }
         if (finite(next)) {
             state_ = next;
         } else {
-            state_ = start_;
+            state_ = model_.x0;
             restarts = restarts + 1;
         }
         for (std::size_t i = 0; i < x.size(); ++i) {
@@ -61,55 +125,8 @@ public:
     }
 
 private:
-    struct Model {
-        Matrix a, b, c, l;
-    };
-    Model read() {
-        const Matrices given(*this, {{"A", "1,0.001;0,1", "n x n: x(k+1) = Ax + Bu"},
-                                     {"B", "0;0.001", "n x m; default: no inputs"},
-                                     {"C", "1,0", "p x n: z = Cx"},
-                                     {"L", "", "n x p: gain; alternatively poles"},
-                                     {"poles", "0.95,0.9",
-                                      "n: poles of the error; real, inside of the unit circle; "
-                                      "distinct if there is one measurement"},
-                                     {"x0", "", "n: initial states; default: 0"}});
-        const Dense& a = given.square("A");
-        const Eigen::Index n = a.rows();
-        const Dense b = given.has("B") ? given.at("B", n, given.at("B").value.cols(),
-                                                  "it has a row per state, as A has")
-                                       : Dense(Dense::Zero(n, 0));
-        const Dense c =
-            given.at("C", given.at("C").value.rows(), n, "it has a column per state, as A has");
-        start_ = given.has("x0") ? Vector(given.vector("x0", n, "it has a number per state"))
-                                 : Vector(Vector::Zero(n));
-        if (given.has("L")) {
-            // the estimate is corrected after the prediction: its error is multiplied by (I - LC) A
-            const Dense l =
-                given.at("L", n, c.rows(), "it has a row per state and a column per measurement");
-            if (const double radius = spectral_radius(a - l * c * a); radius >= 1.0) {
-                given.refuse("L",
-                             "with this gain the observer is unstable: its largest pole is " +
-                                 std::to_string(radius),
-                             "use poles= instead of L=");
-            }
-            return {a, b, c, l};
-        }
-        const Eigen::VectorXd poles = given.vector("poles", n, "one for each state");
-        if (poles.cwiseAbs().maxCoeff() >= 1.0) {
-            given.refuse("poles", "a pole is outside of the unit circle",
-                         "use poles between 0 and 1: 0 settles in one cycle, 0.99 in some hundred");
-        }
-        const auto l = place_observer(a, c * a, poles.cast<std::complex<double>>());
-        if (!l) {
-            given.refuse("C",
-                         "the plant is not observable, or a pole of the observer is one of its own",
-                         "look at C, or change the poles slightly");
-        }
-        return {a, b, c, *l};
-    }
-
-    Vector start_, state_;
-    Model model_;
+    const Observer model_;
+    Vector state_;
 
 public:
     hal::Ins<double> u, z;

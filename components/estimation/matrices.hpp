@@ -301,6 +301,27 @@ public:
         }
         return given.value;
     }
+    /// Returns a matrix that must have this many rows. [setup]
+    const Eigen::MatrixXd& with_rows(const char* name, Eigen::Index rows,
+                                     const std::string& why) const {
+        return at(name, rows, at(name).value.cols(), why);
+    }
+    /// Returns a matrix that must have this many columns. [setup]
+    const Eigen::MatrixXd& with_columns(const char* name, Eigen::Index columns,
+                                        const std::string& why) const {
+        return at(name, at(name).value.rows(), columns, why);
+    }
+    /// Returns a symmetric matrix that must have this size. `why_size` and `why_symmetric` explain
+    /// the rule to the user. [setup]
+    const Eigen::MatrixXd& symmetric(const char* name, Eigen::Index size,
+                                     const std::string& why_size,
+                                     const std::string& why_symmetric) const {
+        const Eigen::MatrixXd& matrix = at(name, size, size, why_size);
+        if ((matrix - matrix.transpose()).norm() > 1e-12 * matrix.norm()) {
+            refuse(name, std::string(name) + " is not symmetric", why_symmetric);
+        }
+        return matrix;
+    }
     /// Returns a vector of `count` values, written as a row or as a column. [setup]
     Eigen::VectorXd vector(const char* name, Eigen::Index count, const std::string& why) const {
         const Given& given = at(name);

@@ -1,12 +1,87 @@
 // SPDX-License-Identifier: MIT
 #include <cmath>
 #include <memory>
+#include <numeric>
 #include <vector>
 
 #include "hal/component.hpp"
 #include "hal/retained.hpp"
 
 namespace {
+
+// The polynomial of the least squares fit is sum_k <y, p_k> p_k for an orthonormal basis p_k on the
+// points t = -age / (window - 1) (A. Savitzky, M. Golay, *Smoothing and Differentiation of Data by
+// Simplified Least Squares Procedures*, 1964). Its derivative d at t = 0 is d! times the coefficient
+// of t^d, so the weight of the sample y_i in it is d! sum_k c_kd p_k(t_i).
+
+struct Polynomial {
+    std::vector<double> values;  ///< on the points, by age
+    std::vector<double> coefficients;  ///< of 1, t, t^2 …
+};
+
+/// Returns t^k on `points` points, as a polynomial of at most `degree`.
+Polynomial power(std::size_t k, std::size_t points, std::size_t degree) {
+    Polynomial p{std::vector<double>(points), std::vector<double>(degree + 1, 0.0)};
+    p.coefficients[k] = 1.0;
+    for (std::size_t age = 0; age < points; ++age) {
+        const double t = -static_cast<double>(age) / static_cast<double>(points - 1);
+        p.values[age] = std::pow(t, static_cast<double>(k));
+    }
+    return p;
+}
+
+double dot(const std::vector<double>& a, const std::vector<double>& b) {
+    return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
+}
+
+/// y += factor * x
+void add(std::vector<double>& y, double factor, const std::vector<double>& x) {
+    for (std::size_t i = 0; i < y.size(); ++i) {
+        y[i] += factor * x[i];
+    }
+}
+
+void normalise(Polynomial& p) {
+    const double norm = std::sqrt(dot(p.values, p.values));
+    for (double& value : p.values) {
+        value /= norm;
+    }
+    for (double& coefficient : p.coefficients) {
+        coefficient /= norm;
+    }
+}
+
+/// Returns a basis of the polynomials of at most `degree` that is orthonormal on the points, by
+/// Gram-Schmidt. A second pass removes what rounding left of the first.
+std::vector<Polynomial> orthonormal_basis(std::size_t points, std::size_t degree) {
+    constexpr int passes = 2;
+    std::vector<Polynomial> basis;
+    for (std::size_t k = 0; k <= degree; ++k) {
+        Polynomial p = power(k, points, degree);
+        for (int pass = 0; pass < passes; ++pass) {
+            for (const Polynomial& b : basis) {
+                const double projection = dot(p.values, b.values);
+                add(p.values, -projection, b.values);
+                add(p.coefficients, -projection, b.coefficients);
+            }
+        }
+        normalise(p);
+        basis.push_back(std::move(p));
+    }
+    return basis;
+}
+
+/// Returns the weights of the samples in `scale` times the coefficient of t^power of the fitted
+/// polynomial; all are 0 for a power above its degree.
+std::vector<double> weights_of(const std::vector<Polynomial>& basis, std::size_t power,
+                               double scale) {
+    std::vector<double> weights(basis.front().values.size(), 0.0);
+    if (power >= basis.size()) return weights;
+    for (const Polynomial& p : basis) {
+        add(weights, scale * p.coefficients[power], p.values);
+    }
+    return weights;
+}
 
 struct SavgolDiff : hal::Component {
     explicit SavgolDiff(const hal_host* host)
@@ -74,61 +149,15 @@ struct SavgolDiff : hal::Component {
 private:
     std::size_t size() const noexcept { return static_cast<std::size_t>(window); }
 
-    /// Least squares for a polynomial in t = -age / (window - 1), by orthogonal polynomials on
-    /// these points (Gram-Schmidt, twice), and its value and derivatives at age 0 (A. Savitzky, M.
-    /// Golay, *Smoothing and Differentiation of Data by Simplified Least Squares Procedures*,
-    /// 1964).
+    /// Computes the weights that give the value and the derivatives of the fitted polynomial at
+    /// age 0.
     void design() {
-        const std::size_t n = size();
-        const std::size_t degree = static_cast<std::size_t>(order);
-        const double reach = static_cast<double>(n - 1);
-        struct Poly {
-            std::vector<double> at, c;  // values on the points, coefficients
-        };
-        std::vector<Poly> basis;
-        for (std::size_t k = 0; k <= degree; ++k) {
-            Poly p{std::vector<double>(n), std::vector<double>(degree + 1, 0.0)};
-            p.c[k] = 1.0;
-            for (std::size_t i = 0; i < n; ++i) {
-                p.at[i] = std::pow(-static_cast<double>(i) / reach, static_cast<double>(k));
-            }
-            for (int twice = 0; twice < 2; ++twice) {
-                for (const Poly& b : basis) {
-                    double dot = 0.0;
-                    for (std::size_t i = 0; i < n; ++i) {
-                        dot += p.at[i] * b.at[i];
-                    }
-                    for (std::size_t i = 0; i < n; ++i) {
-                        p.at[i] -= dot * b.at[i];
-                    }
-                    for (std::size_t i = 0; i <= degree; ++i) {
-                        p.c[i] -= dot * b.c[i];
-                    }
-                }
-            }
-            double norm = 0.0;
-            for (const double x : p.at) {
-                norm += x * x;
-            }
-            norm = std::sqrt(norm);
-            for (double& x : p.at) {
-                x /= norm;
-            }
-            for (double& x : p.c) {
-                x /= norm;
-            }
-            basis.push_back(std::move(p));
-        }
-        const double scales[] = {1.0, 1.0 / reach, 2.0 / (reach * reach)};  // d! / reach^d
-        for (std::size_t d = 0; d < 3; ++d) {
-            weights_[d].assign(n, 0.0);
-            const double scale = scales[d];
-            for (const Poly& b : basis) {
-                for (std::size_t i = 0; d <= degree && i < n; ++i) {
-                    weights_[d][i] += scale * b.c[d] * b.at[i];
-                }
-            }
-        }
+        const double span = static_cast<double>(window - 1);  // of the points, in samples
+        const std::vector<Polynomial> basis =
+            orthonormal_basis(size(), static_cast<std::size_t>(order));
+        weights_[0] = weights_of(basis, 0, 1.0);
+        weights_[1] = weights_of(basis, 1, 1.0 / span);
+        weights_[2] = weights_of(basis, 2, 2.0 / (span * span));  // d! / span^d
     }
 
     std::vector<double> weights_[3];  // of the value and its derivatives, by age

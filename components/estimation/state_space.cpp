@@ -99,10 +99,11 @@ private:
         Model model;
         model.a = given.square("A");
         const auto n = model.a.rows();
-        model.b = given.at("B", n, given.at("B").value.cols(), "it has a row per state, as A has");
-        model.c = given.has("C")
-                      ? given.at("C", given.at("C").value.rows(), n, "it has a column per state")
-                      : Dense(Dense::Identity(n, n));
+        model.b = given.with_rows("B", n, "it has a row per state, as A has");
+        model.c = Matrix::Identity(n, n);
+        if (given.has("C")) {
+            model.c = given.with_columns("C", n, "it has a column per state");
+        }
         model.d = Matrix::Zero(model.c.rows(), model.b.cols());
         if (given.has("D")) {
             model.d = given.at("D", model.c.rows(), model.b.cols(),

@@ -182,12 +182,18 @@ std::optional<Dense> place_observer(const Dense& a, const Dense& c, const Eigen:
     return Dense(product(weights, x.inverse()).transpose());
 }
 
-bool positive(const Dense& a, bool semi) {
+bool is_positive_definite(const Dense& a) {
     const Eigen::SelfAdjointEigenSolver<Dense> solver(symmetric(a), Eigen::EigenvaluesOnly);
     const double min = solver.eigenvalues().minCoeff();
+    const double max_magnitude = solver.eigenvalues().cwiseAbs().maxCoeff();
+    return min > 0.0 && min > 1e-14 * max_magnitude;
+}
 
-    const double max = solver.eigenvalues().cwiseAbs().maxCoeff();
-    return semi ? min >= -1e-12 * max : min > 1e-14 * max && min > 0.0;
+bool is_positive_semidefinite(const Dense& a) {
+    const Eigen::SelfAdjointEigenSolver<Dense> solver(symmetric(a), Eigen::EigenvaluesOnly);
+    const double min = solver.eigenvalues().minCoeff();
+    const double max_magnitude = solver.eigenvalues().cwiseAbs().maxCoeff();
+    return min >= -1e-12 * max_magnitude;
 }
 
 }  // namespace hal::estimation

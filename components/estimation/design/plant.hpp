@@ -56,8 +56,10 @@ double spectral_radius(const Dense& a);
 /// own, or one without its conjugate. [setup]
 std::optional<Dense> place_observer(const Dense& a, const Dense& c, const Eigen::VectorXcd& poles);
 
-/// True when all eigenvalues of a symmetric matrix are above (or, with `semi`, not below) 0.
-/// [setup]
-bool positive(const Dense& a, bool semi = false);
+/// Returns whether all eigenvalues of a symmetric matrix are above 0. [setup]
+bool is_positive_definite(const Dense& a);
+
+/// Returns whether no eigenvalue of a symmetric matrix is below 0. [setup]
+bool is_positive_semidefinite(const Dense& a);
 
 }  // namespace hal::estimation
