@@ -112,10 +112,10 @@ int to_page(Mode mode, const CompileOptions& options, const std::string& path) {
         return fail(options, fmt::format("'{}' has no manual page: {}", path, problem));
     }
     if (mode == view) return show(page, temporary);
-    const bool adoc = mode == asciidoc;
-    const std::string usual = name + (adoc ? ".adoc" : ".9");
-    const std::string& output = options.output.empty() ? usual : options.output;
-    problem = write_file(output, adoc ? as_asciidoc(page) : as_man(page));
+    const bool is_adoc = mode == asciidoc;
+    const std::string default_output = name + (is_adoc ? ".adoc" : ".9");
+    const std::string& output = options.output.empty() ? default_output : options.output;
+    problem = write_file(output, is_adoc ? as_asciidoc(page) : as_man(page));
     return problem.empty() ? 0 : fail(options, problem);
 }
 
@@ -137,45 +137,61 @@ void append_split(std::vector<std::string>& to, const char* text) {
     to.insert(to.end(), given.begin(), given.end());
 }
 
-/// Parses the options before the files. Returns the exit code when nothing remains to be done.
+// Options without a letter, as getopt_long returns them.
+enum LongOption { compile_args = 1000, link_args, print_modinc, adoc, view_doc, install_doc };
+
+constexpr const char* short_options = "pcido:uP:Uh";
+constexpr option long_options[] = {{"preprocess", no_argument, nullptr, 'p'},
+                                   {"compile", no_argument, nullptr, 'c'},
+                                   {"install", no_argument, nullptr, 'i'},
+                                   {"document", no_argument, nullptr, 'd'},
+                                   {"adoc", no_argument, nullptr, adoc},
+                                   {"view-doc", no_argument, nullptr, view_doc},
+                                   {"install-doc", no_argument, nullptr, install_doc},
+                                   {"outfile", required_argument, nullptr, 'o'},
+                                   {"userspace", no_argument, nullptr, 'u'},
+                                   {"personalities", required_argument, nullptr, 'P'},
+                                   {"extra-compile-args", required_argument, nullptr, compile_args},
+                                   {"extra-link-args", required_argument, nullptr, link_args},
+                                   {"unix", no_argument, nullptr, 'U'},
+                                   {"print-modinc", no_argument, nullptr, print_modinc},
+                                   {"help", no_argument, nullptr, 'h'},
+                                   {nullptr, 0, nullptr, 0}};
+
+/// Returns the mode that an option selects, if it is one of those.
+std::optional<Mode> mode_of(int letter) {
+    switch (letter) {
+    case 'p': return preprocess;
+    case 'c': return compile;
+    case 'i': return install;
+    case 'd': return document;
+    case adoc: return asciidoc;
+    case view_doc: return view;
+    default: return std::nullopt;
+    }
+}
+
+/// Parses the options before the files; getopt_long leaves the index of the first file in optind.
+/// Returns the exit status when nothing remains to be done: after --help and an invalid option.
 std::optional<int> parse_options(int argc, char** argv, Mode& mode, CompileOptions& options) {
-    enum { compile_args = 1000, link_args, modinc, adoc_word, view_word, install_doc };
-    static constexpr option words[] = {
-        {"preprocess", no_argument, nullptr, 'p'},
-        {"compile", no_argument, nullptr, 'c'},
-        {"install", no_argument, nullptr, 'i'},
-        {"document", no_argument, nullptr, 'd'},
-        {"adoc", no_argument, nullptr, adoc_word},
-        {"view-doc", no_argument, nullptr, view_word},
-        {"install-doc", no_argument, nullptr, install_doc},
-        {"outfile", required_argument, nullptr, 'o'},
-        {"userspace", no_argument, nullptr, 'u'},
-        {"personalities", required_argument, nullptr, 'P'},
-        {"extra-compile-args", required_argument, nullptr, compile_args},
-        {"extra-link-args", required_argument, nullptr, link_args},
-        {"unix", no_argument, nullptr, 'U'},
-        {"print-modinc", no_argument, nullptr, modinc},
-        {"help", no_argument, nullptr, 'h'},
-        {nullptr, 0, nullptr, 0}};
-    for (int letter; (letter = ::getopt_long(argc, argv, "pcido:uP:Uh", words, nullptr)) != -1;) {
+    for (;;) {
+        const int letter = ::getopt_long(argc, argv, short_options, long_options, nullptr);
+        if (letter == -1) return std::nullopt;
+        if (const std::optional<Mode> selected = mode_of(letter)) {
+            mode = *selected;
+            continue;
+        }
         switch (letter) {
-        case 'p': mode = preprocess; break;
-        case 'c': mode = compile; break;
-        case 'i': mode = install; break;
-        case 'd': mode = document; break;
-        case adoc_word: mode = asciidoc; break;
-        case view_word: mode = view; break;
         case 'o': options.output = ::optarg; break;
         case 'u': options.as_program = true; break;
+        case 'U': break;
         case 'P':
-            if (!is_count(::optarg)) {
-                return fail(options,
-                            fmt::format("--personalities={}: write a number from 1", ::optarg));
-            }
-            break;
+            if (is_count(::optarg)) break;
+            return fail(options,
+                        fmt::format("--personalities={}: write a number from 1", ::optarg));
         case compile_args: append_split(options.compile_args, ::optarg); break;
         case link_args: append_split(options.link_args, ::optarg); break;
-        case modinc:
+        case print_modinc:
             return fail(
                 options,
                 "--print-modinc is for LinuxCNC's makefiles; build with --compile or --install");
@@ -183,12 +199,10 @@ std::optional<int> parse_options(int argc, char** argv, Mode& mode, CompileOptio
             return fail(options,
                         "--install-doc is not needed: the page is in the plugin; --install it, "
                         "then type: hal doc NAME");
-        case 'U': break;
         case 'h': return exit_code(print(usage));
-        default: return 1;
+        default: return 1;  // getopt_long has printed the reason
         }
     }
-    return std::nullopt;
 }
 
 }  // namespace

@@ -8,8 +8,8 @@
 #include <cstring>
 #include <fcntl.h>
 #include <fmt/core.h>
-#include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <regex>
 #include <sstream>
 #include <sys/wait.h>
@@ -168,46 +168,64 @@ private:
         finish();
     }
 
-    bool construct(bool arguments) {
+    /// Loads the component as a netlist would. `has_arguments`: a failure may be that of a default.
+    /// Returns whether it may run.
+    bool construct(bool has_arguments) {
         stage(Stage::construct);
         Session session(alone(true));
         Shell shell(session, ShellOptions{});
         TextOutput output;
         const EndOfBlock end{*this};
         if (shell.run_text("compile", "loadrt " + name_ + "\n", output) != 0) {
-            const std::string why = first_error(output.err_text);
-            const bool authors = why.find("declare") != std::string::npos ||
-                                 why.find("virtual") != std::string::npos;
-            answer_[arguments && !authors ? "needs" : "problem"] = why;
-            return arguments && !authors;
+            const std::string reason = first_error(output.err_text);
+            const bool needs_arguments = has_arguments && !is_of_declaration(reason);
+            answer_[needs_arguments ? "needs" : "problem"] = reason;
+            return needs_arguments;
         }
         if (!author_) return true;
         for (const auto& component : session.model().components) {
             for (const auto& instance : component->instances) {
-                const Pin* of_all = nullptr;
-                for (const auto& pin : instance->pins) {
-                    const std::string own = pin->name.starts_with(instance->name + ".")
-                                                ? pin->name.substr(instance->name.size() + 1)
-                                                : pin->name;
-                    if (const std::string why = mistake_of(*pin, own); !why.empty()) {
-                        answer_["problem"] = why;
-                        return false;
-                    }
-                    if (!pin->function && !of_all) {
-                        of_all = pin.get();
-                    }
-                }
-                if (of_all && instance->functions.size() > 1) {
-                    answer_["hint"] = fmt::format(
-                        "its {} functions share pin '{}' and others that name no function, so they "
-                        "have to run in one thread; for pins "
-                        "of one function name it: {{*this, FUNCTION, \"{}\", ...}}",
-                        instance->functions.size(), of_all->name,
-                        of_all->name.substr(instance->name.size() + 1));
-                }
+                if (!check_pins(*instance)) return false;
+                hint_at_shared_pins(*instance);
             }
         }
         return true;
+    }
+
+    /// Returns whether an error of loadrt is about a declaration, which no argument changes.
+    static bool is_of_declaration(const std::string& error) {
+        return error.find("declare") != std::string::npos ||
+               error.find("virtual") != std::string::npos;
+    }
+
+    /// Notes the first mistake in the declaration of a pin. Returns whether there is none.
+    bool check_pins(const Instance& instance) {
+        for (const auto& pin : instance.pins) {
+            const std::string mistake = mistake_of(*pin, own_name(*pin, instance));
+            if (mistake.empty()) continue;
+            answer_["problem"] = mistake;
+            return false;
+        }
+        return true;
+    }
+
+    /// The name of a pin without that of its instance.
+    static std::string own_name(const Pin& pin, const Instance& instance) {
+        const std::string prefix = instance.name + ".";
+        return pin.name.starts_with(prefix) ? pin.name.substr(prefix.size()) : pin.name;
+    }
+
+    /// Notes that all functions have to run in one thread, if a pin belongs to all of them.
+    void hint_at_shared_pins(const Instance& instance) {
+        if (instance.functions.size() < 2) return;
+        const auto shared = std::ranges::find_if(
+            instance.pins, [](const auto& pin) { return pin->function == nullptr; });
+        if (shared == instance.pins.end()) return;
+        answer_["hint"] = fmt::format(
+            "its {} functions share pin '{}' and others that name no function, so they "
+            "have to run in one thread; for pins "
+            "of one function name it: {{*this, FUNCTION, \"{}\", ...}}",
+            instance.functions.size(), (*shared)->name, own_name(**shared, instance));
     }
 
     void cycles() {
@@ -286,71 +304,123 @@ std::string place_of(const std::string& problem, const PluginSource& source) {
     return line == 0 ? "" : fmt::format("{}:{}: ", source.path, line);
 }
 
+/// What the process that tries a plugin reported before it ended.
+struct TrialReport {
+    Stage stage = Stage::load;  ///< what it did last
+    Json answer = Json::object();  ///< of Trial; empty if the process ended before it had one
+    int signal = 0;  ///< the signal that ended the process, or 0
+
+    bool is_complete() const { return !answer.empty() && signal == 0; }
+    std::string text(const char* key) const { return answer.value(key, std::string()); }
+};
+
+/// Parses the lines of a Trial: a stage whenever the next one begins, and an answer.
+TrialReport parse_report(const std::string& text, int wait_status) {
+    TrialReport report;
+    std::istringstream lines(text);
+    for (std::string line; std::getline(lines, line);) {
+        Json message = Json::parse(line, nullptr, false);
+        if (!message.is_object()) continue;
+        if (message.contains("stage")) {
+            report.stage = static_cast<Stage>(message["stage"].get<int>());
+        } else {
+            report.answer = std::move(message);
+        }
+    }
+    if (WIFSIGNALED(wait_status)) {
+        report.signal = WTERMSIG(wait_status);
+    }
+    return report;
+}
+
+/// Puts a folder before all others in which plugins are looked for.
+void prepend_plugin_path(const std::string& folder) {
+    const char* const path = std::getenv("HALCYON_PLUGIN_PATH");
+    const std::string others = path && *path ? ":" + std::string(path) : "";
+    ::setenv("HALCYON_PLUGIN_PATH", (folder + others).c_str(), 1);
+}
+
+/// The child process: tries the plugin for at most max_s seconds, without output of its own, and
+/// writes the report to `report_fd`.
+[[noreturn]] void run_trial(const std::string& folder, const std::string& name,
+                            const PluginSource& source, int report_fd) {
+    const int null_device = ::open("/dev/null", O_RDWR);
+    ::dup2(null_device, STDOUT_FILENO);
+    ::dup2(null_device, STDERR_FILENO);
+    std::signal(SIGALRM, SIG_DFL);
+    ::alarm(max_s);
+    prepend_plugin_path(folder);
+    Trial(name, report_fd, source.language == Language::cpp).run();
+    ::_exit(0);  // what the plugin would do at exit is not asked for
+}
+
+/// Tries the plugin in a child process, which it may crash. Returns nullopt, with errno, if no
+/// process can be started.
+std::optional<TrialReport> try_in_child(const std::string& folder, const std::string& name,
+                                        const PluginSource& source) {
+    int pipe_ends[2];
+    if (::pipe2(pipe_ends, O_CLOEXEC) != 0) return std::nullopt;
+    const auto [read_end, write_end] = pipe_ends;
+    const pid_t child = ::fork();
+    if (child == 0) {
+        run_trial(folder, name, source, write_end);
+    }
+    const int fork_error = errno;
+    ::close(write_end);
+    if (child < 0) {
+        ::close(read_end);
+        errno = fork_error;
+        return std::nullopt;
+    }
+    std::string text;
+    const int wait_status = finish_program(child, read_end, text);
+    return parse_report(text, wait_status);
+}
+
+/// Describes a plugin whose process ended before it had an answer.
+void describe_end(const TrialReport& report, const std::string& name, BuiltPlugin& built) {
+    built.loads = report.stage != Stage::load;
+    const std::string subject = built.loads ? "component '" + name + "': " : "";
+    built.problem = subject + end_in(report.stage, report.signal);
+}
+
+void describe_problem(const TrialReport& report, const PluginSource& source, BuiltPlugin& built) {
+    built.problem = report.text("problem");
+    built.loads = report.text("kind") != "no-component";
+    if (built.loads) {
+        built.problem = place_of(built.problem, source) + built.problem;
+    }
+}
+
+void describe_component(const TrialReport& report, BuiltPlugin& built) {
+    built.name = report.text("name");
+    built.summary = report.text("summary");
+    built.function = report.text("function");
+    built.needs = report.text("needs");
+    built.hint = report.text("hint");
+    built.starts = report.answer.value("starts", false);
+    built.pins = report.answer.value("pins", std::size_t{0});
+    built.functions = report.answer.value("functions", std::size_t{0});
+}
+
 }  // namespace
 
 bool try_plugin(const std::string& folder, const std::string& name, const PluginSource& source,
                 BuiltPlugin& built) {
-    int ends[2];
-    if (::pipe2(ends, O_CLOEXEC) != 0) {
+    const std::optional<TrialReport> report = try_in_child(folder, name, source);
+    if (!report) {
         built.problem = fmt::format("it cannot be tried: {}", std::strerror(errno));
         return false;
     }
-    const pid_t child = ::fork();
-    if (child == 0) {
-        const int nothing = ::open("/dev/null", O_RDWR);
-        ::dup2(nothing, STDOUT_FILENO);
-        ::dup2(nothing, STDERR_FILENO);
-        std::signal(SIGALRM, SIG_DFL);
-        ::alarm(max_s);
-        const char* const path = std::getenv("HALCYON_PLUGIN_PATH");
-        ::setenv("HALCYON_PLUGIN_PATH",
-                 (folder + (path && *path ? ":" + std::string(path) : "")).c_str(), 1);
-        Trial(name, ends[1], source.language == Language::cpp).run();
-        ::_exit(0);  // what the plugin would do at exit is not asked for
-    }
-    ::close(ends[1]);
-    if (child < 0) {
-        built.problem = fmt::format("it cannot be tried: {}", std::strerror(errno));
-        ::close(ends[0]);
+    if (!report->is_complete()) {
+        describe_end(*report, name, built);
         return false;
     }
-    std::string text;
-    const int status = finish_program(child, ends[0], text);
-    Json answer = Json::object();
-    auto stage = Stage::load;
-    std::istringstream lines(text);
-    for (std::string line; std::getline(lines, line);) {
-        const Json one = Json::parse(line, nullptr, false);
-        if (!one.is_object()) continue;
-        if (one.contains("stage")) {
-            stage = static_cast<Stage>(one["stage"].get<int>());
-        } else {
-            answer = one;
-        }
-    }
-    const auto word = [&](const char* key) { return answer.value(key, std::string()); };
-    if (answer.empty() || WIFSIGNALED(status)) {
-        built.loads = stage != Stage::load;
-        built.problem = (built.loads ? "component '" + name + "': " : "") +
-                        end_in(stage, WIFSIGNALED(status) ? WTERMSIG(status) : 0);
+    if (!report->text("problem").empty()) {
+        describe_problem(*report, source, built);
         return false;
     }
-    if (const std::string problem = word("problem"); !problem.empty()) {
-        built.problem = problem;
-        built.loads = word("kind") != "no-component";
-        if (built.loads) {
-            built.problem = place_of(problem, source) + problem;
-        }
-        return false;
-    }
-    built.name = word("name");
-    built.summary = word("summary");
-    built.function = word("function");
-    built.needs = word("needs");
-    built.hint = word("hint");
-    built.starts = answer.value("starts", false);
-    built.pins = answer.value("pins", std::size_t{0});
-    built.functions = answer.value("functions", std::size_t{0});
+    describe_component(*report, built);
     return true;
 }
 
