@@ -20,6 +20,7 @@
 #include "canopen/master/gateway/gateway_command.hpp"
 #include "cli/output.hpp"
 #include "cli/prompt_loop.hpp"
+#include "text/characters.hpp"
 
 namespace hal::tools {
 
@@ -177,38 +178,21 @@ public:
     ~GatewaySession() override { ::close(fd_); }
 
     int execute(std::string_view text) override {
-        while (!text.empty() &&
-               (text.back() == ' ' || text.back() == '\t' || text.back() == '\r')) {
-            text.remove_suffix(1);
-        }
-        while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) {
-            text.remove_prefix(1);
-        }
-        if (text.empty() || text.front() == '#') return 0;
-        if (text == "quit" || text == "exit") {
+        const std::string_view command = trimmed(text);
+        if (command.empty() || command.front() == '#') return 0;
+        if (command == "quit" || command == "exit") {
             over_ = true;
             return 0;
         }
-        if (text.front() == '[') {
+        if (command.front() == '[') {
             return fail(
                 options_,
                 fmt::format("'{}': sequence numbers are added here; type the command without one",
-                            text));
+                            command));
         }
-        std::string answer;
-        if (!ask(text, answer)) return 1;
-        if (answer.starts_with("ERROR:")) {
-            return fail(options_, fmt::format("{}: {}", text, error_text(answer)));
-        }
-        if (!print(answer + "\n")) {
-            over_ = true;
-            return 1;
-        }
-        if (text != "help") return 0;
-        listing_ = true;  // lines follow the response; the next response ends them
-        const bool whole = ask("info version", answer);
-        listing_ = false;
-        return exit_code(whole);
+        const int status = send_command(command);
+        const bool is_listing_next = status == 0 && command == "help";
+        return is_listing_next ? receive_listing() : status;
     }
     Completion complete(std::string_view line, std::size_t cursor) override {
         Completion out;
@@ -265,6 +249,28 @@ public:
     }
 
 private:
+    /// Sends a command and prints its response. Returns the exit status.
+    int send_command(std::string_view command) {
+        std::string answer;
+        if (!ask(command, answer)) return 1;
+        if (answer.starts_with("ERROR:")) {
+            return fail(options_, fmt::format("{}: {}", command, error_text(answer)));
+        }
+        if (!print(answer + "\n")) {
+            over_ = true;
+            return 1;
+        }
+        return 0;
+    }
+    /// Prints the lines that follow the response to `help`. Nothing marks the last one, so they end
+    /// with the response to another command. Returns the exit status.
+    int receive_listing() {
+        std::string version;
+        listing_ = true;
+        const bool is_complete = ask("info version", version);
+        listing_ = false;
+        return exit_code(is_complete);
+    }
     /// Waits for the response to a command. Returns false after printing the reason.
     bool ask(std::string_view text, std::string& answer) {
         constexpr std::int64_t limit = 60'000'000'000;

@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <fmt/core.h>
+#include <optional>
 #include <span>
+#include <vector>
 
 #include "bus/canopen/pdo_settings.hpp"
 #include "bus/json_text.hpp"
@@ -63,7 +65,7 @@ std::string json_of(const PdoSettings& p) {
 /// Formats a PDO as a line, and a line for each mapped object.
 std::string lines_of(const PdoSettings& p) {
     std::string text = fmt::format("{:7} {:>8}  {}", p.name(), p.identifier(), p.timing());
-    if (p.count > 64) {
+    if (p.is_multiplexed()) {
         return text + (p.count == 0xff ? ", multiplexed: to an object of another node\n"
                                        : ", multiplexed: from an object of its own\n");
     }
@@ -395,6 +397,85 @@ std::string values_of(const PdoSettings& p, const can::Frame& f, bool json) {
     return text;
 }
 
+/// Reads the enabled PDOs of a node; on a capture, where no node can be read, from its description.
+/// Returns an empty vector after printing the reason.
+std::vector<PdoSettings> enabled_pdos(const PdoWatchOptions& options, NodeClient& station,
+                                      std::uint8_t node, const ObjectNames& names) {
+    std::vector<PdoSettings> pdos;
+    if (station.bus.is_capture()) {
+        pdos = described_pdos(names, node);
+        if (pdos.empty()) {
+            fail(options,
+                 "cannot read the PDOs of a node from a capture; add --eds FILE, an EDS or "
+                 "DCF that describes them");
+            return pdos;
+        }
+    } else if (!read_pdos(station, options, node, names, pdos)) {
+        return {};
+    }
+    std::erase_if(pdos, [](const PdoSettings& p) { return !p.on(); });
+    if (pdos.empty()) {
+        fail(options,
+             fmt::format("all PDOs of node {} are disabled; to enable one: hal can pdo enable",
+                         node));
+    }
+    return pdos;
+}
+
+/// Prints the values of received PDOs, with their times since the first frame.
+class PdoPrinter {
+public:
+    /// `max_count`: number of PDOs after which it is done; 0: unlimited.
+    PdoPrinter(const std::vector<PdoSettings>& pdos, bool json, std::uint64_t max_count)
+        : pdos_(pdos), json_(json), max_count_(max_count) {}
+
+    /// Prints those of a batch. Returns whether to continue: not after `max_count`, nor after a
+    /// failure to print.
+    bool print_batch(std::span<const can::Frame> batch) {
+        std::string text;
+        for (const can::Frame& frame : batch) {
+            if (!first_ns_) {
+                first_ns_ = frame.time_ns;
+            }
+            const PdoSettings* const pdo = find(frame);
+            if (!pdo) continue;
+            text += line(*pdo, frame);
+            ++count_;
+            if (is_done()) break;
+        }
+        printed_ = print(text);
+        return printed_ && !is_done();
+    }
+    /// Returns whether everything could be printed.
+    bool succeeded() const { return printed_; }
+
+private:
+    bool is_done() const { return max_count_ != 0 && count_ == max_count_; }
+    /// Returns the PDO that a node sent in this frame, or nullptr.
+    const PdoSettings* find(const can::Frame& frame) const {
+        if (frame.own || frame.error) return nullptr;
+        const auto pdo = std::ranges::find_if(
+            pdos_, [&](const PdoSettings& candidate) { return candidate.matches(frame); });
+        return pdo == pdos_.end() ? nullptr : &*pdo;
+    }
+    std::string line(const PdoSettings& pdo, const can::Frame& frame) const {
+        const double time_s = static_cast<double>(frame.time_ns - *first_ns_) / 1e9;
+        const std::string values = values_of(pdo, frame, json_);
+        if (json_) {
+            return fmt::format("{{\"time\":{:.6f},\"pdo\":\"{}\",\"values\":{{{}}}}}\n", time_s,
+                               pdo.name(), values);
+        }
+        return fmt::format("{:12.6f}  {:6}{}\n", time_s, pdo.name(), values);
+    }
+
+    const std::vector<PdoSettings>& pdos_;
+    const bool json_;
+    const std::uint64_t max_count_;
+    std::uint64_t count_ = 0;
+    std::optional<std::int64_t> first_ns_;  // time of the first frame, of a PDO or not
+    bool printed_ = true;
+};
+
 }  // namespace
 
 int run_can_pdo_enable(const PdoSwitchOptions& options) { return set_on(options, true); }
@@ -406,53 +487,13 @@ int run_can_pdo_watch(const PdoWatchOptions& options) {
     if (!read_words(options, false, node, names, nullptr)) return 1;
     NodeClient station(options, options.timeout_ns);
     if (!station.open(options.words[0])) return 1;
-    std::vector<PdoSettings> pdos;
-    if (station.bus.is_capture()) {
-        pdos = described_pdos(names, node);
-        if (pdos.empty()) {
-            return fail(options,
-                        "cannot read the PDOs of a node from a capture; add --eds FILE, an EDS or "
-                        "DCF that describes them");
-        }
-    } else if (!read_pdos(station, options, node, names, pdos)) {
-        return 1;
-    }
-    std::erase_if(pdos, [](const PdoSettings& p) { return !p.on(); });
-    if (pdos.empty()) {
-        return fail(
-            options,
-            fmt::format("all PDOs of node {} are disabled; to enable one: hal can pdo enable",
-                        node));
-    }
+    const std::vector<PdoSettings> pdos = enabled_pdos(options, station, node, names);
+    if (pdos.empty()) return 1;
     station.bus.announce(options);
-    std::uint64_t seen = 0;
-    std::int64_t first = 0;
-    bool written = true;
-    bool any = false;
-    listen(station.bus, options.for_ns, [&](std::span<const can::Frame> batch) {
-        std::string text;
-        for (const can::Frame& f : batch) {
-            if (!any) {
-                any = true;
-                first = f.time_ns;
-            }
-            const auto p = std::find_if(pdos.begin(), pdos.end(), [&](const PdoSettings& one) {
-                return !f.own && !f.error && one.matches(f);
-            });
-            if (p == pdos.end()) continue;
-            const double time = static_cast<double>(f.time_ns - first) / 1e9;
-            if (options.json) {
-                text += fmt::format("{{\"time\":{:.6f},\"pdo\":\"{}\",\"values\":{{{}}}}}\n", time,
-                                    p->name(), values_of(*p, f, true));
-            } else {
-                text += fmt::format("{:12.6f}  {:6}{}\n", time, p->name(), values_of(*p, f, false));
-            }
-            if (++seen == options.count) break;
-        }
-        written = print(text);
-        return written && (options.count == 0 || seen < options.count);
-    });
-    return exit_code(written);
+    PdoPrinter printer(pdos, options.json, options.count);
+    listen(station.bus, options.for_ns,
+           [&](std::span<const can::Frame> batch) { return printer.print_batch(batch); });
+    return exit_code(printer.succeeded());
 }
 
 }  // namespace hal::tools

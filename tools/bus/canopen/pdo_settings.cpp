@@ -14,7 +14,11 @@ using canopen::SdoRequest;
 
 namespace {
 
-/// Reads a value from the node, or from its description. Returns false when there is none.
+constexpr unsigned max_pdos = 512;      // of each direction
+constexpr unsigned pdos_per_axis = 64;  // CiA 402: an offset per axis
+constexpr unsigned max_dummy_index = 7;  // CiA 301: objects that fill a gap in a mapping
+
+/// Reads a value from the node, or from its description. Returns why there is none.
 using Source = std::function<Abort(std::uint16_t index, std::uint8_t sub, std::uint32_t& value)>;
 
 Source of_node(NodeClient& station, std::uint8_t node) {
@@ -43,42 +47,137 @@ Source of_description(const canopen::eds::DeviceDescription& d, std::uint8_t nod
     };
 }
 
-Abort fill(const Source& source, const ObjectNames& names, PdoSettings& p) {
-    std::uint32_t value = 0;
-    const auto get = [&](std::uint16_t index, std::uint8_t sub, auto& to) {
-        const Abort why = source(index, sub, value);
-        if (why == Abort::none) {
-            to = static_cast<std::remove_reference_t<decltype(to)>>(value);
-        }
-        return why;
-    };
-    const std::uint16_t index = p.communication_index();
-    if (const Abort why = get(index, 1, p.cob); why != Abort::none) return why;
-    std::vector<Abort> rest{get(index, 2, p.transmission)};
-    rest.push_back(get(index, 3, p.inhibit_100us));
-    p.has_inhibit = rest.back() == Abort::none;
-    rest.push_back(get(index, 5, p.event_ms));
-    p.has_event = rest.back() == Abort::none;
-    if (!p.received) {
-        rest.push_back(get(index, 6, p.sync_start));
+/// Reads objects of one PDO. A node that did not respond once is not asked again.
+class ObjectReader {
+public:
+    explicit ObjectReader(const Source& source) : source_(source) {}
+
+    /// Returns whether the object was read; if not, `value` is unchanged.
+    template <class Value> bool read(std::uint16_t index, std::uint8_t sub, Value& value) {
+        if (timed_out()) return false;
+        std::uint32_t number = 0;
+        abort_ = source_(index, sub, number);
+        if (abort_ != Abort::none) return false;
+        value = static_cast<Value>(number);
+        return true;
     }
-    rest.push_back(get(p.mapping_index(), 0, p.count));
-    p.mapping.clear();
-    for (unsigned n = 1; n <= p.count && n <= 64; ++n) {
-        std::uint32_t entry = 0;
-        rest.push_back(get(p.mapping_index(), static_cast<std::uint8_t>(n), entry));
+    /// Returns why the last object was not read.
+    Abort abort() const { return abort_; }
+    bool timed_out() const { return abort_ == Abort::timeout; }
+
+private:
+    const Source& source_;
+    Abort abort_ = Abort::none;
+};
+
+std::vector<PdoSettings::Item> read_mapping(ObjectReader& reader, const ObjectNames& names,
+                                            const PdoSettings& p) {
+    std::vector<PdoSettings::Item> mapping;
+    if (p.is_multiplexed()) return mapping;
+    for (unsigned n = 1; n <= p.count; ++n) {
+        std::uint32_t entry = 0;  // of CiA 301: index, sub-index, length in bits
+        reader.read(p.mapping_index(), static_cast<std::uint8_t>(n), entry);
         ObjectName object = names.named(static_cast<std::uint16_t>(entry >> 16),
                                         static_cast<std::uint8_t>(entry >> 8));
-        if (object.index <= 7 && object.name.empty()) {
+        if (object.index <= max_dummy_index && object.name.empty()) {
             object.name = "dummy";
         }
-        p.mapping.push_back({std::move(object), entry & 0xff});
+        mapping.push_back({std::move(object), entry & 0xff});
     }
-    for (const Abort why : rest) {
-        if (why == Abort::timeout) return why;
-    }
-    return Abort::none;
+    return mapping;
 }
+
+/// Reads the PDO of `p.received` and `p.number`. Returns Abort::timeout if the node stops
+/// responding, and the reason if there is no such PDO. A parameter that the PDO does not have keeps
+/// its default.
+Abort read_settings(const Source& source, const ObjectNames& names, PdoSettings& p) {
+    const std::uint16_t communication = p.communication_index();
+    ObjectReader reader(source);
+    if (!reader.read(communication, 1, p.cob)) return reader.abort();
+    reader.read(communication, 2, p.transmission);
+    p.has_inhibit = reader.read(communication, 3, p.inhibit_100us);
+    p.has_event = reader.read(communication, 5, p.event_ms);
+    if (!p.received) {
+        reader.read(communication, 6, p.sync_start);
+    }
+    reader.read(p.mapping_index(), 0, p.count);
+    p.mapping = read_mapping(reader, names, p);
+    return reader.timed_out() ? Abort::timeout : Abort::none;
+}
+
+/// Returns the numbers of the RPDOs (`received`) or TPDOs that a description has.
+std::vector<unsigned> described_numbers(const canopen::eds::DeviceDescription& description,
+                                        bool received) {
+    const unsigned first = PdoSettings::first_communication_index(received);
+    std::vector<unsigned> numbers;
+    for (const canopen::eds::Object& object : description.objects) {
+        if (object.index >= first && object.index < first + max_pdos) {
+            numbers.push_back(object.index - first + 1);
+        }
+    }
+    return numbers;
+}
+
+/// Reads the PDOs of a node one after the other.
+class PdoCollector {
+public:
+    PdoCollector(NodeClient& station, std::uint8_t node, const ObjectNames& names)
+        : station_(station), node_(node), names_(names) {}
+
+    /// Reads those that the description has. Returns false after printing why the node does not
+    /// respond.
+    bool read_described(const canopen::eds::DeviceDescription& description, bool received) {
+        for (const unsigned number : described_numbers(description, received)) {
+            if (read(received, number) == Outcome::no_response) return false;
+        }
+        return true;
+    }
+    /// Without a description: tries the PDOs of each axis in the order of their numbers, until as
+    /// many are missing one after the other as suffices to say that there are no more. Returns
+    /// false after printing why the node does not respond.
+    bool probe(bool received) {
+        for (unsigned offset = 0; offset < max_pdos; offset += pdos_per_axis) {
+            const unsigned sufficient = offset == 0 ? 4 : 1;
+            unsigned missing = 0;
+            for (unsigned n = 1; n <= pdos_per_axis && missing < sufficient; ++n) {
+                const Outcome outcome = read(received, offset + n);
+                if (outcome == Outcome::no_response) return false;
+                missing = outcome == Outcome::missing ? missing + 1 : 0;
+            }
+        }
+        return true;
+    }
+    std::vector<PdoSettings> take() { return std::move(pdos_); }
+
+private:
+    enum class Outcome { present, missing, no_response };
+
+    /// Reads a PDO and adds it. Prints a missing response.
+    Outcome read(bool received, unsigned number) {
+        PdoSettings pdo;
+        pdo.received = received;
+        pdo.number = number;
+        const Abort abort = read_pdo(station_, node_, names_, pdo);
+        if (abort == Abort::timeout) {
+            report_timeout(pdo);
+            return Outcome::no_response;
+        }
+        if (abort != Abort::none) return Outcome::missing;
+        pdos_.push_back(std::move(pdo));
+        return Outcome::present;
+    }
+    void report_timeout(const PdoSettings& pdo) const {
+        const ObjectName identifier{pdo.communication_index(), 1, {}, {}};
+        SdoRequest request{.index = identifier.index, .sub = identifier.sub};
+        request.abort = Abort::timeout;
+        station_.fail_transfer(node_, request, identifier.label());
+    }
+
+    NodeClient& station_;
+    const std::uint8_t node_;
+    const ObjectNames& names_;
+    std::vector<PdoSettings> pdos_;
+};
 
 }  // namespace
 
@@ -138,48 +237,19 @@ bool parse_pdo(const std::string& text, PdoSettings& p) {
 }
 
 Abort read_pdo(NodeClient& station, std::uint8_t node, const ObjectNames& names, PdoSettings& p) {
-    return fill(of_node(station, node), names, p);
+    return read_settings(of_node(station, node), names, p);
 }
 
 bool read_pdos(NodeClient& station, const Options& options, std::uint8_t node,
                const ObjectNames& names, std::vector<PdoSettings>& out) {
-    const auto take = [&](bool received, unsigned number, bool& there) {
-        PdoSettings p;
-        p.received = received;
-        p.number = number;
-        const Abort why = read_pdo(station, node, names, p);
-        there = why == Abort::none;
-        if (there) {
-            out.push_back(std::move(p));
-        }
-        if (why != Abort::timeout) return true;
-        SdoRequest silent{.index = p.communication_index(), .sub = 1};
-        silent.abort = Abort::timeout;
-        station.fail_transfer(node, silent, ObjectName{p.communication_index(), 1, {}, {}}.label());
-
-        return false;
-    };
-    bool there = false;
+    PdoCollector collector(station, node, names);
+    const canopen::eds::DeviceDescription* const description = names.description();
     for (const bool received : {true, false}) {
-        if (const auto* d = names.description()) {
-            const unsigned base = received ? 0x1400 : 0x1800;
-            for (const canopen::eds::Object& object : d->objects) {
-                if (object.index >= base && object.index < base + 512 &&
-                    !take(received, object.index - base + 1, there)) {
-                    return false;
-                }
-            }
-            continue;
-        }
-        // Without a description: from the first PDO of each axis (they are 64 apart) until four
-        // consecutive ones are missing.
-        for (unsigned axis = 0; axis < 512; axis += 64) {
-            for (unsigned n = 1, missing = 0; n <= 64 && missing < (axis == 0 ? 4U : 1U); ++n) {
-                if (!take(received, axis + n, there)) return false;
-                missing = there ? 0 : missing + 1;
-            }
-        }
+        const bool responds = description ? collector.read_described(*description, received)
+                                          : collector.probe(received);
+        if (!responds) return false;
     }
+    out = collector.take();
     if (out.empty()) {
         fail(options, fmt::format("node {} has no PDOs", node));
         return false;
@@ -189,16 +259,17 @@ bool read_pdos(NodeClient& station, const Options& options, std::uint8_t node,
 
 std::vector<PdoSettings> described_pdos(const ObjectNames& names, std::uint8_t node) {
     std::vector<PdoSettings> out;
-    const auto* d = names.description();
-    if (!d) return out;
-    for (const canopen::eds::Object& object : d->objects) {
-        PdoSettings p;
-        p.received = object.index < 0x1600;
-        const unsigned base = p.received ? 0x1400 : 0x1800;
-        if (object.index < base || object.index >= base + 512) continue;
-        p.number = object.index - base + 1;
-        if (fill(of_description(*d, node), names, p) == Abort::none) {
-            out.push_back(std::move(p));
+    const canopen::eds::DeviceDescription* const description = names.description();
+    if (!description) return out;
+    const Source source = of_description(*description, node);
+    for (const bool received : {true, false}) {
+        for (const unsigned number : described_numbers(*description, received)) {
+            PdoSettings pdo;
+            pdo.received = received;
+            pdo.number = number;
+            if (read_settings(source, names, pdo) == Abort::none) {
+                out.push_back(std::move(pdo));
+            }
         }
     }
     return out;

@@ -11,6 +11,8 @@
 namespace hal::tools {
 
 struct PdoSettings {
+    static constexpr unsigned max_mapped = 64;  ///< objects of CiA 301
+
     struct Item {
         ObjectName object;
         unsigned bits = 0;
@@ -21,18 +23,20 @@ struct PdoSettings {
     bool received = false;   ///< by the node: an RPDO
     unsigned number = 1;     ///< from 1
     std::uint32_t cob = canopen::cob_invalid;
-    /// count: sub-index 0 of the mapping
     std::uint8_t transmission = 255;
     std::uint8_t sync_start = 0;
-    std::uint8_t count = 0;
+    std::uint8_t count = 0;  ///< sub-index 0 of the mapping: mapped objects, or a kind of MPDO
     std::uint16_t inhibit_100us = 0;
     std::uint16_t event_ms = 0;
     bool has_inhibit = false;
     bool has_event = false;
     std::vector<Item> mapping = {};
 
+    static std::uint16_t first_communication_index(bool received) {
+        return received ? 0x1400 : 0x1800;
+    }
     std::uint16_t communication_index() const {
-        return static_cast<std::uint16_t>((received ? 0x1400 : 0x1800) + number - 1);
+        return static_cast<std::uint16_t>(first_communication_index(received) + number - 1);
     }
     std::uint16_t mapping_index() const {
         return static_cast<std::uint16_t>(communication_index() + 0x200);
@@ -42,6 +46,7 @@ struct PdoSettings {
         return on() && !f.remote && f.id == canopen::cob_id(cob) &&
                f.extended == ((cob & canopen::cob_extended) != 0);
     }
+    bool is_multiplexed() const { return count > max_mapped; }  ///< an MPDO, with no mapping
     unsigned bits() const;
     std::string name() const;      ///< "TPDO1"
     std::string identifier() const;  ///< "181", "off"

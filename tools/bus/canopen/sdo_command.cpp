@@ -46,10 +46,9 @@ bool parse_target(const SdoOptions& options, SdoTarget& target) {
     }
     if (options.block) {
         target.mode = SdoMode::block;
-    } else if (options.segmented) {
+    }
+    if (options.segmented) {
         target.mode = SdoMode::segmented;
-    } else {
-        target.mode = SdoMode::automatic;
     }
     return true;
 }
@@ -57,7 +56,9 @@ bool parse_target(const SdoOptions& options, SdoTarget& target) {
 bool save(const SdoReadOptions& options, std::span<const std::uint8_t> bytes) {
     const std::string why =
         write_file(options.output, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
-    return why.empty() || (fail(options, why), false);
+    if (why.empty()) return true;
+    fail(options, why);
+    return false;
 }
 
 std::string json_line(std::uint8_t node, const ObjectName& object, Type type,
@@ -70,6 +71,34 @@ std::string json_line(std::uint8_t node, const ObjectName& object, Type type,
         bytes.size(), hex_bytes(bytes, ""));
 }
 
+/// Checks that the other options suit `--output`, which writes the bytes of one object. Returns
+/// false after printing the reason.
+bool check_output(const SdoReadOptions& options, std::size_t objects) {
+    if (options.output.empty()) return true;
+    if (objects != 1) {
+        fail(options, "-o writes the bytes of one object; name only one");
+        return false;
+    }
+    if (options.json || !options.type.empty()) {
+        fail(options,
+             fmt::format(
+                 "{} has no effect with -o, which writes the bytes as they are; delete one of them",
+                 options.json ? "--json" : "--type"));
+        return false;
+    }
+    return true;
+}
+
+/// Writes the value of an object to the file of `--output`, or prints it. Returns whether that
+/// succeeded, after printing the reason.
+bool write_value(const SdoReadOptions& options, const SdoTarget& target, const ObjectName& object,
+                 std::span<const std::uint8_t> bytes) {
+    if (!options.output.empty()) return save(options, bytes);
+    const Type type = target.type.value_or(object.type);
+    if (options.json) return print(json_line(target.node, object, type, bytes));
+    return print(fmt::format("{} = {}\n", object.label(), value_text(bytes, type)));
+}
+
 }  // namespace
 
 int run_can_sdo_read(const SdoReadOptions& options) {
@@ -79,43 +108,27 @@ int run_can_sdo_read(const SdoReadOptions& options) {
     }
     SdoTarget target;
     if (!parse_target(options, target)) return 1;
-    std::vector<ObjectName> objects(options.words.size() - 2);
-    std::string problem;
-    for (std::size_t n = 0; n < objects.size(); ++n) {
-        if (!target.names.find(options.words[n + 2], objects[n], problem)) {
-            return fail(options, problem);
-        }
+    std::vector<ObjectName> objects;
+    for (const std::string& word : std::span(options.words).subspan(2)) {
+        ObjectName object;
+        std::string problem;
+        if (!target.names.find(word, object, problem)) return fail(options, problem);
+        objects.push_back(std::move(object));
     }
-    if (!options.output.empty() && objects.size() != 1) {
-        return fail(options, "-o writes the bytes of one object; name only one");
-    }
-    if (!options.output.empty() && (options.json || !options.type.empty())) {
-        return fail(
-            options,
-            fmt::format(
-                "{} has no effect with -o, which writes the bytes as they are; delete one of them",
-                options.json ? "--json" : "--type"));
-    }
+    if (!check_output(options, objects.size())) return 1;
     NodeClient station(options, options.timeout_ns);
     if (!station.open(options.words[0])) return 1;
-    const auto received = std::make_unique_for_overwrite<std::uint8_t[]>(max_bytes);
+    const auto buffer = std::make_unique_for_overwrite<std::uint8_t[]>(max_bytes);
     for (const ObjectName& object : objects) {
         SdoRequest request{.index = object.index,
                            .sub = object.sub,
                            .upload = true,
                            .mode = target.mode,
-                           .buffer = {received.get(), max_bytes}};
+                           .buffer = {buffer.get(), max_bytes}};
         if (!station.transfer(target.node, request)) {
             return station.fail_transfer(target.node, request, object.label());
         }
-        const std::span<const std::uint8_t> bytes(received.get(), request.size);
-        const Type type = target.type.value_or(object.type);
-        if (!options.output.empty()) return exit_code(save(options, bytes));
-        if (!print(options.json
-                       ? json_line(target.node, object, type, bytes)
-                       : fmt::format("{} = {}\n", object.label(), value_text(bytes, type)))) {
-            return 1;
-        }
+        if (!write_value(options, target, object, {buffer.get(), request.size})) return 1;
     }
     return 0;
 }
