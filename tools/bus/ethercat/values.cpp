@@ -187,75 +187,115 @@ const ValueType* type_of(const EthercatValueOptions& options, EthercatSession& s
     return reported != nullptr ? reported : &value_types[std::size(value_types) - 1];
 }
 
-/// One SDO transfer as the arguments describe it.
-int transfer(const EthercatValueOptions& options, bool download) {
-    EthercatSession session;
-    if (!session.open(options, true)) return 1;
+/// An object of a slave, and the type of its value.
+struct SlaveObject {
+    const BusSlave* slave = nullptr;
+    std::uint16_t index = 0;
+    std::uint8_t sub = 0;
+    const ValueType* type = nullptr;
+
+    std::string label() const { return fmt::format("0x{:04X}:{}", index, sub); }
+};
+
+/// Finds the object of the arguments INDEX SUB [VALUE] on the open bus. Returns nullopt after
+/// printing the reason.
+std::optional<SlaveObject> find_object(const EthercatValueOptions& options,
+                                       EthercatSession& session, bool download) {
     const auto& words = session.arguments();
     if (words.size() != (download ? 3U : 2U)) {
-        return fail(options, fmt::format("type: {} ADDRESS -p N INDEX SUB{}", options.program,
-                                         download ? " VALUE" : ""));
+        fail(options, fmt::format("type: {} ADDRESS -p N INDEX SUB{}", options.program,
+                                  download ? " VALUE" : ""));
+        return std::nullopt;
     }
     const auto index = ethercat_number(words[0], 0xffff);
-    const auto sub = ethercat_number(words[1], 0xff);
     if (!index) {
-        return fail(options, fmt::format("invalid index '{}'; write 0..0xffff", words[0]));
+        fail(options, fmt::format("invalid index '{}'; write 0..0xffff", words[0]));
+        return std::nullopt;
     }
+    const auto sub = ethercat_number(words[1], 0xff);
     if (!sub) {
-        return fail(options, fmt::format("invalid sub-index '{}'; write 0..255", words[1]));
+        fail(options, fmt::format("invalid sub-index '{}'; write 0..255", words[1]));
+        return std::nullopt;
     }
-    const BusSlave* s = session.chosen(options);
-    if (s == nullptr) return 1;
-    const std::string what = fmt::format("0x{:04X}:{}", *index, *sub);
-    const ValueType* type = type_of(options, session, *s, static_cast<std::uint16_t>(*index),
-                                    static_cast<std::uint8_t>(*sub), download);
-    if (type == nullptr) return 1;
-    Bytes bytes(65536);
-    if (download) {
-        if (const auto value = value_bytes(words[2], *type)) {
-            bytes = *value;
-        } else {
-            return fail(
-                options,
-                fmt::format("invalid value '{}' for {}, type {}; --type selects another one",
-                            words[2], what, type->name));
-        }
-    }
+    SlaveObject object;
+    object.index = static_cast<std::uint16_t>(*index);
+    object.sub = static_cast<std::uint8_t>(*sub);
+    object.slave = session.chosen(options);
+    if (object.slave == nullptr) return std::nullopt;
+    object.type = type_of(options, session, *object.slave, object.index, object.sub, download);
+    if (object.type == nullptr) return std::nullopt;
+    return object;
+}
+
+/// Uploads the object to `bytes`, which it shortens to the value, or downloads `bytes` to it.
+/// Returns false after printing the reason.
+bool transfer(const EthercatValueOptions& options, EthercatSession& session,
+              const SlaveObject& object, MailboxRequest::Kind kind, Bytes& bytes) {
     MailboxRequest request;
-    request.kind = download ? MailboxRequest::Kind::sdo_download : MailboxRequest::Kind::sdo_upload;
-    request.slave = s->number;
-    request.index = static_cast<std::uint16_t>(*index);
-    request.sub = static_cast<std::uint8_t>(*sub);
+    request.kind = kind;
+    request.slave = object.slave->number;
+    request.index = object.index;
+    request.sub = object.sub;
     request.data = bytes;
     if (!session.run(request)) {
-        return fail(options,
-                    fmt::format("slave {}: {}: not finished within 60 s", s->position, what));
+        fail(options, fmt::format("slave {}: {}: not finished within 60 s", object.slave->position,
+                                  object.label()));
+        return false;
     }
-    if (gateway_is_lost(options, session)) return 1;
-    if (!request.result) return fail_mailbox(options, *s, what, request.result);
-    if (!download) {
+    if (gateway_is_lost(options, session)) return false;
+    if (!request.result) {
+        fail_mailbox(options, *object.slave, object.label(), request.result);
+        return false;
+    }
+    if (kind == MailboxRequest::Kind::sdo_upload) {
         bytes.resize(request.result.length);
     }
-    if (!download && !options.type.empty() && type->bytes != 0 && bytes.size() != type->bytes) {
-        return fail(options,
-                    fmt::format("{} has {} bytes, type {} has {}; --type selects another one", what,
-                                bytes.size(), type->name, type->bytes));
-    }
-    std::string plain;
-    const std::string text = value_text_of(bytes, *type, plain);
-    if (options.json) {
-        return print(fmt::format(
-                   "{{\"position\":{},\"index\":{},\"sub\":{},\"type\":\"{}\",\"value\":{}}}\n",
-                   s->position, *index, *sub, type->name, plain))
-                   ? 0
-                   : 1;
-    }
-    return download || print(text + "\n") ? 0 : 1;
+    return true;
+}
+
+std::string json_line(const SlaveObject& object, const std::string& value) {
+    return fmt::format("{{\"position\":{},\"index\":{},\"sub\":{},\"type\":\"{}\",\"value\":{}}}\n",
+                       object.slave->position, object.index, object.sub, object.type->name, value);
 }
 
 }  // namespace
 
-int run_ethercat_upload(const EthercatValueOptions& options) { return transfer(options, false); }
-int run_ethercat_download(const EthercatValueOptions& options) { return transfer(options, true); }
+int run_ethercat_upload(const EthercatValueOptions& options) {
+    EthercatSession session;
+    if (!session.open(options, true)) return 1;
+    const std::optional<SlaveObject> object = find_object(options, session, false);
+    if (!object) return 1;
+    Bytes bytes(65536);
+    if (!transfer(options, session, *object, MailboxRequest::Kind::sdo_upload, bytes)) return 1;
+    const ValueType& type = *object->type;
+    const bool has_fixed_size = !options.type.empty() && type.bytes != 0;
+    if (has_fixed_size && bytes.size() != type.bytes) {
+        return fail(options,
+                    fmt::format("{} has {} bytes, type {} has {}; --type selects another one",
+                                object->label(), bytes.size(), type.name, type.bytes));
+    }
+    std::string json_value;
+    const std::string text = value_text_of(bytes, type, json_value);
+    return exit_code(print(options.json ? json_line(*object, json_value) : text + "\n"));
+}
+
+int run_ethercat_download(const EthercatValueOptions& options) {
+    EthercatSession session;
+    if (!session.open(options, true)) return 1;
+    const std::optional<SlaveObject> object = find_object(options, session, true);
+    if (!object) return 1;
+    const std::string& text = session.arguments()[2];
+    std::optional<Bytes> bytes = value_bytes(text, *object->type);
+    if (!bytes) {
+        return fail(options,
+                    fmt::format("invalid value '{}' for {}, type {}; --type selects another one",
+                                text, object->label(), object->type->name));
+    }
+    if (!transfer(options, session, *object, MailboxRequest::Kind::sdo_download, *bytes)) return 1;
+    if (!options.json) return 0;
+    std::string json_value;
+    value_text_of(*bytes, *object->type, json_value);
+    return exit_code(print(json_line(*object, json_value)));
+}
 
 }  // namespace hal::tools
