@@ -17,46 +17,101 @@ char folded(char c) { return c == '_' || c == '.' ? '-' : lower(c); }
 constexpr int max_edits = 5;
 constexpr int typed_in_part = max_edits + 2;  // ranks below any mistyped name
 
-/// Counts the insertions, deletions, replacements and swaps of neighbours that lead from `a` to
-/// `b`; `limit` + 1 stands for more. Only the diagonal band that can stay within `limit` is
-/// computed, so the time is linear in the length.
-int edits(std::string_view a, std::string_view b, int limit) {
-    const int n = static_cast<int>(a.size());
-    const int m = static_cast<int>(b.size());
-    const int far = limit + 1;
-    if (n - m > limit || m - n > limit) return far;
-    const auto at = [](std::string_view text, int i) {
-        return folded(text[static_cast<std::size_t>(i)]);
-    };
-    // cell d of row i is column i + d - 1 - limit; a border on both sides
-    std::array<int, 2 * max_edits + 3> rows[3];
-    for (auto& row : rows) {
-        row.fill(far);
+/// Counts the edits (insertions, deletions, replacements and swaps of neighbours) that lead from a
+/// name to a candidate, whose characters are appended one after the other: candidates with a common
+/// beginning share the rows of it. All texts are folded.
+///
+/// Row i is that of the first i characters of the candidate, column j that of the first j characters
+/// of the name (Levenshtein, with the swap of Damerau). Only the diagonal band that can stay within
+/// the limit is stored, so the time is linear in the length: cell d of row i is column
+/// i + d - 1 - limit, with a border on both sides.
+class EditTable {
+public:
+    EditTable(std::string_view name, int limit)
+        : name_(name), limit_(limit), above_limit_(limit + 1) {
+        append_row();
     }
-    for (int i = 0; i <= n; ++i) {
-        auto &now = rows[i % 3], &before = rows[(i + 2) % 3], &two_before = rows[(i + 1) % 3];
-        now.fill(far);
-        int best = far;
-        for (int d = 1; d <= 2 * limit + 1; ++d) {
-            const auto k = static_cast<std::size_t>(d);
-            const int j = i + d - 1 - limit;
-            if (j < 0 || j > m) continue;
-            int cost = i == 0 ? j : i;  // against an empty beginning
-            if (i > 0 && j > 0) {
-                cost = std::min({before[k] + (at(a, i - 1) != at(b, j - 1)), before[k + 1] + 1,
-                                 now[k - 1] + 1});
-                if (i > 1 && j > 1 && at(a, i - 1) == at(b, j - 2) &&
-                    at(a, i - 2) == at(b, j - 1)) {
-                    cost = std::min(cost, two_before[k] + 1);
-                }
-            }
-            now[k] = std::min(cost, far);
-            best = std::min(best, now[k]);
+
+    std::size_t length() const { return candidate_.size(); }
+
+    /// Removes the characters of the candidate after the first `length`.
+    void truncate(std::size_t length) {
+        if (length >= candidate_.size()) return;
+        candidate_.resize(length);
+        rows_.resize(length + 1);
+    }
+    /// Appends a character. Returns false when every candidate with this beginning has more edits
+    /// than the limit.
+    bool append(char c) {
+        candidate_ += c;
+        return append_row() <= limit_;
+    }
+    /// Returns the number of edits; limit + 1 stands for more.
+    int edits() const {
+        const int cell = cell_of(static_cast<int>(length()), static_cast<int>(name_.size()));
+        const bool is_in_band = cell >= 1 && cell <= width();
+        return is_in_band ? rows_.back()[static_cast<std::size_t>(cell)] : above_limit_;
+    }
+
+private:
+    using Row = std::array<int, 2 * max_edits + 3>;
+
+    int width() const { return 2 * limit_ + 1; }
+    int cell_of(int row, int column) const { return column - row + 1 + limit_; }
+
+    /// Computes the row behind the last one. Returns its smallest number of edits.
+    int append_row() {
+        const int row = static_cast<int>(rows_.size());
+        rows_.emplace_back().fill(above_limit_);
+        int min = above_limit_;
+        for (int cell = 1; cell <= width(); ++cell) {
+            const int column = row + cell - 1 - limit_;
+            if (column < 0 || column > static_cast<int>(name_.size())) continue;
+            const int edits = std::min(edits_at(row, column), above_limit_);
+            rows_.back()[static_cast<std::size_t>(cell)] = edits;
+            min = std::min(min, edits);
         }
-        if (best == far) return far;
+        return min;
     }
-    const int last = m - n + 1 + limit;
-    return rows[n % 3][static_cast<std::size_t>(last)];
+    /// Returns the edits of a cell from those before it, which are computed already.
+    int edits_at(int row, int column) const {
+        if (row == 0) return column;  // insert all
+        if (column == 0) return row;  // delete all
+        const auto i = static_cast<std::size_t>(row);
+        const auto j = static_cast<std::size_t>(column);
+        const auto d = static_cast<std::size_t>(cell_of(row, column));
+        const bool differ = candidate_[i - 1] != name_[j - 1];
+        const int replaced = rows_[i - 1][d] + (differ ? 1 : 0);
+        const int deleted = rows_[i - 1][d + 1] + 1;
+        const int inserted = rows_[i][d - 1] + 1;
+        const int least = std::min({replaced, deleted, inserted});
+        const bool are_swapped = i > 1 && j > 1 && candidate_[i - 1] == name_[j - 2] &&
+                                 candidate_[i - 2] == name_[j - 1];
+        return are_swapped ? std::min(least, rows_[i - 2][d] + 1) : least;
+    }
+
+    const std::string_view name_;
+    const int limit_;
+    const int above_limit_;
+    std::string candidate_;
+    std::vector<Row> rows_;  // one more than the candidate has characters
+};
+
+/// Returns the edits from the name of a new table to a candidate; limit + 1 stands for more.
+int edits_to(std::string_view candidate, EditTable& table) {
+    table.truncate(0);
+    for (const char c : candidate) {
+        if (!table.append(folded(c))) break;
+    }
+    return table.edits();
+}
+
+std::string folded(std::string_view text) {
+    std::string result;
+    for (const char c : text) {
+        result += folded(c);
+    }
+    return result;
 }
 
 /// The number of edits up to which a name is similar to this one.
@@ -83,9 +138,11 @@ std::vector<std::string> similar(std::string_view name, const std::vector<std::s
     };
     std::vector<Found> found;
     const int limit = edit_limit(name);
+    const std::string folded_name = folded(name);
+    EditTable table(folded_name, limit);
     for (const std::string& candidate : candidates) {
         if (candidate == name) continue;
-        int distance = edits(name, candidate, limit);
+        int distance = edits_to(candidate, table);
         if (distance > limit && name.size() >= 3 && starts_with(candidate, name)) {
             distance = typed_in_part;
         }
@@ -112,9 +169,7 @@ void NameIndex::add(std::string_view name, std::uint32_t number) {
     names_.push_back({static_cast<std::uint32_t>(texts_.size()),
                       static_cast<std::uint32_t>(name.size()), number});
     texts_ += name;
-    for (const char c : name) {
-        folded_ += hal::folded(c);
-    }
+    folded_ += hal::folded(name);
 }
 
 std::uint64_t NameIndex::steps() const { return steps_.load(std::memory_order_relaxed); }
@@ -135,73 +190,31 @@ void NameIndex::sort(const std::stop_token& stop) const {
     }
 }
 
-// The table of edits() with a row for each character of the candidate. Sorted names share
-// beginnings, so the rows of a shared beginning are computed once; and where a beginning is already
-// too different, so are all names that have it.
+// Sorted names share beginnings, whose rows of the table are computed once; and where a beginning is
+// already too different, so are all names that have it.
 std::vector<NameIndex::Found> NameIndex::within(std::string_view name, int limit,
                                                 std::uint32_t before,
                                                 const std::stop_token& stop) const {
-    using Row = std::array<int, 2 * max_edits + 3>;
-    const int far = limit + 1;
-    const int m = static_cast<int>(name.size());
+    constexpr std::size_t none = std::string_view::npos;
     std::vector<Found> found;
-    std::vector<Row> rows(1);
-    rows[0].fill(far);
-    for (int d = 1; d <= 2 * limit + 1; ++d) {
-        if (const int j = d - 1 - limit; j >= 0 && j <= m) {
-            rows[0][static_cast<std::size_t>(d)] = std::min(j, far);
-        }
-    }
-    // rows that belong to the beginning of the candidate
-    std::size_t valid = 0;
-    std::size_t hopeless = std::string_view::npos;  // length of a beginning that is too different
+    EditTable table(name, limit);
+    std::size_t rejected_length = none;  // of a beginning that is too different
     std::uint64_t steps = 0;
     for (std::uint32_t i = 0; i < names_.size() && !stop.stop_requested(); ++i) {
         ++steps;
         const std::size_t common = i == 0 ? 0 : common_[i];
-        if (common >= hopeless) continue;
-        hopeless = std::string_view::npos;
-        valid = std::min(valid, common);
+        if (common >= rejected_length) continue;
+        rejected_length = none;
+        table.truncate(common);
         const std::string_view candidate = folded(i);
-        for (; valid < candidate.size(); ++valid) {
+        while (table.length() < candidate.size() && rejected_length == none) {
             ++steps;
-            const std::size_t row = valid + 1;
-            if (rows.size() <= row) {
-                rows.resize(row + 1);
+            if (!table.append(candidate[table.length()])) {
+                rejected_length = table.length();
             }
-            rows[row].fill(far);
-            int best = far;
-            for (int d = 1; d <= 2 * limit + 1; ++d) {
-                const auto k = static_cast<std::size_t>(d);
-                const int j = static_cast<int>(row) + d - 1 - limit;
-                if (j < 0 || j > m) continue;
-                int cost = static_cast<int>(row);
-                if (j > 0) {
-                    const auto column = static_cast<std::size_t>(j);
-                    const bool differs = candidate[row - 1] != name[column - 1];
-                    cost = std::min({rows[row - 1][k] + differs, rows[row - 1][k + 1] + 1,
-                                     rows[row][k - 1] + 1});
-                    const bool swapped = row > 1 && j > 1 &&
-                                         candidate[row - 1] == name[column - 2] &&
-                                         candidate[row - 2] == name[column - 1];
-                    if (swapped) {
-                        cost = std::min(cost, rows[row - 2][k] + 1);
-                    }
-                }
-                rows[row][k] = std::min(cost, far);
-                best = std::min(best, cost);
-            }
-            if (best < far) continue;
-            hopeless = row;
-            break;
         }
-        if (hopeless != std::string_view::npos) {
-            valid = hopeless;
-            continue;
-        }
-        const int last = m - static_cast<int>(candidate.size()) + 1 + limit;
-        if (last < 1 || last > 2 * limit + 1 || names_[i].number >= before) continue;
-        const int distance = rows[candidate.size()][static_cast<std::size_t>(last)];
+        if (rejected_length != none || names_[i].number >= before) continue;
+        const int distance = table.edits();
         if (distance <= limit) {
             found.push_back({distance, i});
         }
@@ -237,10 +250,7 @@ std::vector<std::string> NameIndex::similar(std::string_view name, std::size_t m
                                             std::uint32_t before,
                                             const std::stop_token& stop) const {
     std::call_once(sorted_, [&] { sort(stop); });
-    std::string folded_name;
-    for (const char c : name) {
-        folded_name += hal::folded(c);
-    }
+    const std::string folded_name = hal::folded(name);
     std::vector<Found> found = within(folded_name, edit_limit(name), before, stop);
     if (stop.stop_requested()) {
         return {};
