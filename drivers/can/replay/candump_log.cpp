@@ -295,65 +295,98 @@ bool parse_log_line(std::string_view line, Frame& f) {
 
 namespace {
 
-/// States that line `number` may have lost its last bytes, which its frame does not show.
-std::string no_end_of_line(std::size_t number) {
-    return "line " + std::to_string(number) +
-           ": the last line has no end of line: its frame may be cut off; remove it, or end it if "
-           "it is complete";
-}
+/// Reads the lines of a log. A line that is not a frame is reported once, and does not end the log.
+class LogParser {
+public:
+    LogParser(std::string_view text, std::vector<Frame>& frames)
+        : text_(text), frames_(frames), has_relative_times_(begins_at_zero(text)) {}
+
+    /// Returns the first problem, or "".
+    std::string parse() {
+        std::size_t begin = 0;
+        while (begin < text_.size() && !is_cut_off_) {
+            const auto end = std::min(text_.find('\n', begin), text_.size());
+            ++line_number_;
+            parse_line(plain(text_.substr(begin, end - begin)), end < text_.size());
+            begin = end + 1;
+        }
+        return problem_;
+    }
+
+private:
+    /// candump -tz writes the time since the first frame, and -td that since the previous one, in
+    /// the same form; both begin with 0.
+    static bool begins_at_zero(std::string_view text) {
+        return text.substr(std::min(text.find('('), text.size())).starts_with("(000.");
+    }
+
+    void parse_line(const std::string& line, bool has_end) {
+        if (is_comment(line)) return;
+        Frame frame;
+        const bool is_logged = parse_log_line(line, frame);
+        const Screen screen = is_logged ? Screen::other : parse_screen_line(line, frame);
+        const bool is_frame = is_logged || screen == Screen::frame;
+        may_have_details_ = screen == Screen::frame && frame.error;
+        if (!has_end && (is_frame || !frames_.empty())) {
+            is_cut_off_ = true;  // the frame does not show it: its last bytes may be missing
+            report(
+                "the last line has no end of line: its frame may be cut off; remove it, or end "
+                "it if it is complete");
+        } else if (is_frame) {
+            add(frame);
+        } else {
+            report(invalid_line(line, screen));
+        }
+    }
+    /// Returns whether a line is about the log, or has details of the error frame before it
+    /// (candump -e), which begin with a tab.
+    bool is_comment(const std::string& line) const {
+        return line.empty() || line.starts_with("DROPCOUNT: ") ||
+               (may_have_details_ && line[0] == '\t');
+    }
+    void add(const Frame& frame) {
+        const bool goes_back = !frames_.empty() && frame.time_ns < frames_.back().time_ns;
+        frames_.push_back(frame);
+        if (has_relative_times_ && goes_back) {
+            report(
+                "the time goes back: differences, as candump -td prints them; record with: "
+                "candump -L");
+        }
+    }
+    /// States why a line is not a frame.
+    static std::string invalid_line(const std::string& line, Screen screen) {
+        if (screen == Screen::no_time) {
+            return "terminal format of candump, without times; record with: candump -L, or candump "
+                   "-ta";
+        }
+        if (screen == Screen::not_hexadecimal) {
+            return "terminal format of candump, not with plain hexadecimal bytes; record with: "
+                   "candump -L";
+        }
+        if (is_xl(line)) return "CAN XL frame; supported: classic and FD frames";
+        return "invalid frame; expected `(1436509052.249713) can0 181#0102`";
+    }
+    /// Keeps the first problem, with the number of its line.
+    void report(const std::string& sentence) {
+        if (problem_.empty()) {
+            problem_ = "line " + std::to_string(line_number_) + ": " + sentence;
+        }
+    }
+
+    const std::string_view text_;
+    std::vector<Frame>& frames_;
+    const bool has_relative_times_;
+    std::size_t line_number_ = 0;
+    bool may_have_details_ = false;  // after an error frame of the terminal format
+    bool is_cut_off_ = false;
+    std::string problem_;
+};
 
 }  // namespace
 
 std::string parse_log(std::string_view text, std::vector<Frame>& frames) {
-    std::string problem = other_format(text);
-    if (!problem.empty()) return problem;
-    // candump -tz writes the time since the first frame, and -td that since the last one, in the
-    // same form
-    const bool since = text.substr(std::min(text.find('('), text.size())).starts_with("(000.");
-    bool details = false;  // of an error frame, candump -e: lines that begin with a tab
-    for (std::size_t at = 0, number = 1; at < text.size(); ++number) {
-        const auto end = std::min(text.find('\n', at), text.size());
-        const std::string line = plain(text.substr(at, end - at));
-        at = end + 1;
-        if (line.empty() || line.starts_with("DROPCOUNT: ") || (details && line[0] == '\t')) {
-            continue;
-        }
-        Frame f;
-        const bool logged = parse_log_line(line, f);
-        Screen screen = logged ? Screen::other : parse_screen_line(line, f);
-        details = screen == Screen::frame && f.error;
-        const bool is_frame = logged || screen == Screen::frame;
-        if (end == text.size() && (is_frame || !frames.empty())) {
-            if (problem.empty()) {
-                problem = no_end_of_line(number);
-            }
-            break;
-        }
-        if (is_frame) {
-            const bool back = since && !frames.empty() && f.time_ns < frames.back().time_ns;
-            frames.push_back(f);
-            if (!back || !problem.empty()) continue;
-            problem = "line " + std::to_string(number) +
-                      ": the time goes back: differences, as candump -td prints them; record with: "
-                      "candump -L";
-        }
-        if (!problem.empty()) continue;
-        problem = "line " + std::to_string(number) + ": ";
-        if (screen == Screen::no_time) {
-            problem +=
-                "terminal format of candump, without times; record with: candump -L, or candump "
-                "-ta";
-        } else if (screen == Screen::not_hexadecimal) {
-            problem +=
-                "terminal format of candump, not with plain hexadecimal bytes; record with: "
-                "candump -L";
-        } else if (is_xl(line)) {
-            problem += "CAN XL frame; supported: classic and FD frames";
-        } else {
-            problem += "invalid frame; expected `(1436509052.249713) can0 181#0102`";
-        }
-    }
-    return problem;
+    const std::string format = other_format(text);
+    return format.empty() ? LogParser(text, frames).parse() : format;
 }
 
 }  // namespace hal::can

@@ -9,6 +9,8 @@
 
 #include <cstdlib>
 #include <memory>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "datagram.hpp"
@@ -23,66 +25,101 @@ namespace {
 
 constexpr std::size_t batch = 16;  // datagrams per system call
 
-/// The group: IPv4 or IPv6, and its interface (0: by the routing table).
-struct Place {
+/// A multicast group: its IPv4 or IPv6 address and port, and its interface.
+struct MulticastGroup {
     sockaddr_storage address{};
     socklen_t size = 0;
-    unsigned interface = 0;
-    std::string text;
-    bool is_six() const { return address.ss_family == AF_INET6; }
+    unsigned interface = 0;  ///< its index; 0: by the routing table
+    std::string text;        ///< the complete address of the link
+    bool is_ipv6() const { return address.ss_family == AF_INET6; }
 };
 
-/// Parses `GROUP`, `GROUP:PORT`, `[GROUP6]:PORT`, each with an optional `%INTERFACE` after the
-/// group.
-Place parse(std::string text, std::string& problem) {
-    std::string port = "43113", group = "239.74.163.2", interface;
-    if (!text.empty() && text[0] == '[') {
+/// The parts of an address; those that are not written have their defaults.
+struct AddressParts {
+    std::string group = "239.74.163.2";  // the default of stock tools
+    std::string port = "43113";
+    std::string interface;
+};
+
+/// Splits `GROUP`, `GROUP:PORT`, `[GROUP6]` or `[GROUP6]:PORT`, each with an optional `%INTERFACE`
+/// after the group.
+AddressParts split_address(std::string_view text) {
+    AddressParts parts;
+    if (text.starts_with('[')) {
         const auto end = text.find(']');
-        group = text.substr(1, end == text.npos ? end : end - 1);
-        if (end != text.npos && end + 1 < text.size() && text[end + 1] == ':') {
-            port = text.substr(end + 2);
-        }
-    } else if (!text.empty()) {
-        const auto colon = text.find(':');
-        if (colon != 0) {
-            group = text.substr(0, colon);
-        }
-        if (colon != text.npos) {
-            port = text.substr(colon + 1);
-        }
+        parts.group = text.substr(1, end == text.npos ? end : end - 1);
+        text.remove_prefix(end == text.npos ? text.size() : end + 1);
+    } else if (const std::string_view group = text.substr(0, text.find(':')); !group.empty()) {
+        parts.group = group;
+        text.remove_prefix(group.size());
     }
-    if (const auto percent = group.find('%'); percent != group.npos) {
-        interface = group.substr(percent + 1);
-        group.resize(percent);
+    if (text.starts_with(':')) {
+        parts.port = text.substr(1);
     }
-    Place p;
+    if (const auto percent = parts.group.find('%'); percent != parts.group.npos) {
+        parts.interface = parts.group.substr(percent + 1);
+        parts.group.resize(percent);
+    }
+    return parts;
+}
+
+/// Returns 0 for an invalid port.
+std::uint16_t parse_port(const std::string& text) {
     char* end = nullptr;
-    const unsigned long number = std::strtoul(port.c_str(), &end, 10);
-    if (port.empty() || *end != '\0' || number == 0 || number > 65535) {
-        problem = "invalid port '" + port + "'; write udp:239.74.163.2:43113";
+    const unsigned long number = std::strtoul(text.c_str(), &end, 10);
+    const bool is_number = !text.empty() && *end == '\0';
+    return is_number && number <= 65535 ? static_cast<std::uint16_t>(number) : 0;
+}
+
+/// Sets the address of a group. Returns false if `text` is not a multicast address.
+bool set_address(const std::string& text, std::uint16_t port, MulticastGroup& group) {
+    auto& ipv4 = reinterpret_cast<sockaddr_in&>(group.address);
+    if (inet_pton(AF_INET, text.c_str(), &ipv4.sin_addr) == 1 &&
+        IN_MULTICAST(ntohl(ipv4.sin_addr.s_addr))) {
+        ipv4.sin_family = AF_INET;
+        ipv4.sin_port = htons(port);
+        group.size = sizeof ipv4;
+        return true;
     }
-    if (!interface.empty() && (p.interface = if_nametoindex(interface.c_str())) == 0) {
-        problem = "no interface " + interface + "; to list them: ip -br link";
+    auto& ipv6 = reinterpret_cast<sockaddr_in6&>(group.address);
+    if (inet_pton(AF_INET6, text.c_str(), &ipv6.sin6_addr) == 1 &&
+        IN6_IS_ADDR_MULTICAST(&ipv6.sin6_addr)) {
+        ipv6.sin6_family = AF_INET6;
+        ipv6.sin6_port = htons(port);
+        group.size = sizeof ipv6;
+        return true;
     }
-    auto& four = reinterpret_cast<sockaddr_in&>(p.address);
-    auto& six = reinterpret_cast<sockaddr_in6&>(p.address);
-    if (inet_pton(AF_INET, group.c_str(), &four.sin_addr) == 1 &&
-        IN_MULTICAST(ntohl(four.sin_addr.s_addr))) {
-        four.sin_family = AF_INET;
-        four.sin_port = htons(static_cast<std::uint16_t>(number));
-        p.size = sizeof four;
-    } else if (inet_pton(AF_INET6, group.c_str(), &six.sin6_addr) == 1 &&
-               IN6_IS_ADDR_MULTICAST(&six.sin6_addr)) {
-        six.sin6_family = AF_INET6;
-        six.sin6_port = htons(static_cast<std::uint16_t>(number));
-        p.size = sizeof six;
-    } else if (problem.empty()) {
-        problem = "invalid multicast group '" + group + "'; write udp:239.74.163.2:" + port +
-                  ", the default of stock tools";
+    return false;
+}
+
+/// Formats `udp:GROUP:PORT`, with the interface if there is one.
+std::string text_of(const AddressParts& parts, bool is_ipv6) {
+    const std::string group = is_ipv6 ? "[" + parts.group + "]" : parts.group;
+    const std::string interface = parts.interface.empty() ? "" : "%" + parts.interface;
+    return "udp:" + group + interface + ":" + parts.port;
+}
+
+/// Parses the part of an address behind `udp:`. Sets `problem` if it is invalid, or the interface
+/// is missing.
+MulticastGroup parse_group(std::string_view text, std::string& problem) {
+    const AddressParts parts = split_address(text);
+    MulticastGroup group;
+    const std::uint16_t port = parse_port(parts.port);
+    if (port == 0) {
+        problem = "invalid port '" + parts.port + "'; write udp:239.74.163.2:43113";
     }
-    p.text = "udp:" + (p.is_six() ? "[" + group + "]" : group) +
-             (interface.empty() ? "" : "%" + interface) + ":" + port;
-    return p;
+    if (!parts.interface.empty()) {
+        group.interface = if_nametoindex(parts.interface.c_str());
+        if (group.interface == 0) {
+            problem = "no interface " + parts.interface + "; to list them: ip -br link";
+        }
+    }
+    if (!set_address(parts.group, port, group) && problem.empty()) {
+        problem = "invalid multicast group '" + parts.group +
+                  "'; write udp:239.74.163.2:" + parts.port + ", the default of stock tools";
+    }
+    group.text = text_of(parts, group.is_ipv6());
+    return group;
 }
 
 template <class T>
@@ -90,9 +127,9 @@ bool set(int fd, int level, int name, const T& value) {
     return setsockopt(fd, level, name, &value, sizeof value) == 0;
 }
 
-link::Descriptor receiver(const Place& p, const Options& o, std::string& problem) {
+link::Descriptor receiver(const MulticastGroup& group, const Options& o, std::string& problem) {
     link::Descriptor fd(
-        ::socket(p.address.ss_family, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
+        ::socket(group.address.ss_family, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
     const int yes = 1;
     set(fd.get(), SOL_SOCKET, SO_REUSEADDR, yes);
     set(fd.get(), SOL_SOCKET, SO_REUSEPORT, yes);
@@ -103,46 +140,46 @@ link::Descriptor receiver(const Place& p, const Options& o, std::string& problem
     if (!set(fd.get(), SOL_SOCKET, SO_RCVBUFFORCE, buffer_bytes)) {
         set(fd.get(), SOL_SOCKET, SO_RCVBUF, buffer_bytes);
     }
-    sockaddr_storage any = p.address;
+    sockaddr_storage any = group.address;
     bool joined = false;
-    if (p.is_six()) {
-        auto& six = reinterpret_cast<sockaddr_in6&>(any);
-        const ipv6_mreq request{six.sin6_addr, p.interface};
+    if (group.is_ipv6()) {
+        auto& ipv6 = reinterpret_cast<sockaddr_in6&>(any);
+        const ipv6_mreq request{ipv6.sin6_addr, group.interface};
         joined = set(fd.get(), IPPROTO_IPV6, IPV6_JOIN_GROUP, request);
-        six.sin6_addr = in6addr_any;
+        ipv6.sin6_addr = in6addr_any;
     } else {
-        auto& four = reinterpret_cast<sockaddr_in&>(any);
-        const ip_mreqn request{four.sin_addr, {INADDR_ANY}, static_cast<int>(p.interface)};
+        const auto& ipv4 = reinterpret_cast<const sockaddr_in&>(any);
+        const ip_mreqn request{ipv4.sin_addr, {INADDR_ANY}, static_cast<int>(group.interface)};
         joined = set(fd.get(), IPPROTO_IP, IP_ADD_MEMBERSHIP, request);
         // Bind to the group: any address would receive every group on this port.
     }
     if (!joined) {
         problem = "cannot join the group: " + link::reason() +
                   "; without a route to it, type: sudo ip route add 224.0.0.0/4 dev lo";
-    } else if (::bind(fd.get(), reinterpret_cast<const sockaddr*>(&any), p.size) != 0) {
+    } else if (::bind(fd.get(), reinterpret_cast<const sockaddr*>(&any), group.size) != 0) {
         problem =
             "cannot bind to the port: " + link::reason() + "; to find another user of it: ss -ulp";
     }
     return fd;
 }
 
-link::Descriptor sender(const Place& p, std::string& problem) {
+link::Descriptor sender(const MulticastGroup& group, std::string& problem) {
     link::Descriptor fd(
-        ::socket(p.address.ss_family, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
+        ::socket(group.address.ss_family, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
     const int one = 1;  // hop limit 1, and loopback to this machine
-    if (p.is_six()) {
+    if (group.is_ipv6()) {
         set(fd.get(), IPPROTO_IPV6, IPV6_MULTICAST_HOPS, one);
-        if (p.interface != 0) {
-            set(fd.get(), IPPROTO_IPV6, IPV6_MULTICAST_IF, p.interface);
+        if (group.interface != 0) {
+            set(fd.get(), IPPROTO_IPV6, IPV6_MULTICAST_IF, group.interface);
         }
     } else {
         set(fd.get(), IPPROTO_IP, IP_MULTICAST_TTL, one);
-        if (p.interface != 0) {
+        if (group.interface != 0) {
             set(fd.get(), IPPROTO_IP, IP_MULTICAST_IF,
-                ip_mreqn{{}, {INADDR_ANY}, static_cast<int>(p.interface)});
+                ip_mreqn{{}, {INADDR_ANY}, static_cast<int>(group.interface)});
         }
     }
-    if (::connect(fd.get(), reinterpret_cast<const sockaddr*>(&p.address), p.size) != 0) {
+    if (::connect(fd.get(), reinterpret_cast<const sockaddr*>(&group.address), group.size) != 0) {
         problem = "no route to the group: " + link::reason() +
                   "; type: sudo ip route add 224.0.0.0/4 dev lo";
     }
@@ -151,7 +188,8 @@ link::Descriptor sender(const Place& p, std::string& problem) {
 
 class UdpLink final : public FilteringLink {
 public:
-    UdpLink(const Place& target, const Options& options, link::Descriptor in, link::Descriptor out)
+    UdpLink(const MulticastGroup& target, const Options& options, link::Descriptor in,
+            link::Descriptor out)
         : options_(options),
           in_(std::move(in)),
           out_(std::move(out)),
@@ -328,23 +366,23 @@ private:
 
 Description describe(const std::string& target) {
     std::string problem;
-    const std::string text = parse(target, problem).text;
+    const std::string text = parse_group(target, problem).text;
     return {.address = problem.empty() ? text : "udp:" + target,
             .transport = "CAN over UDP multicast"};
 }
 
 Opened open(const std::string& target, const Options& options) {
     std::string problem;
-    const Place p = parse(target, problem);
+    const MulticastGroup group = parse_group(target, problem);
     if (!problem.empty()) {
         return {nullptr, problem};
     }
-    link::Descriptor in = receiver(p, options, problem);
-    link::Descriptor out = problem.empty() ? sender(p, problem) : link::Descriptor{};
+    link::Descriptor in = receiver(group, options, problem);
+    link::Descriptor out = problem.empty() ? sender(group, problem) : link::Descriptor{};
     if (!problem.empty()) {
         return {nullptr, problem};
     }
-    return {std::make_unique<UdpLink>(p, options, std::move(in), std::move(out)), {}};
+    return {std::make_unique<UdpLink>(group, options, std::move(in), std::move(out)), {}};
 }
 
 }  // namespace hal::can::canudp
