@@ -15,6 +15,24 @@ namespace {
 
 constexpr double warning_heat = 0.9;  // times the heat of the rated torque
 
+constexpr unsigned reserved_touch_probe_bits = 0xc8c8;
+constexpr unsigned reserved_positioning_bits = 0xff3c;
+constexpr unsigned relative_positioning_bits = 0x0003;  // both set: reserved
+constexpr unsigned reserved_polarity_bits = 0x3f;
+
+/// Returns whether a write of the object changes the unit of the set-point.
+constexpr bool scales_set_points(std::uint16_t index) noexcept {
+    switch (index) {
+    case object::polarity:
+    case object::position_encoder_resolution:
+    case object::gear_ratio:
+    case object::feed_constant:
+    case object::velocity_factor:
+    case object::acceleration_factor: return true;
+    default: return false;
+    }
+}
+
 template <class T>
 T limited(double value) noexcept {
     return static_cast<T>(std::clamp<std::int64_t>(whole(value), std::numeric_limits<T>::min(),
@@ -442,36 +460,32 @@ AxisStatus DriveAxis::status() const noexcept {
 
 WriteCheck DriveAxis::check(std::uint16_t index,
                             std::span<const std::uint8_t> value) const noexcept {
-    const auto valid = [](bool ok) {
-        return ok ? WriteCheck::accepted : WriteCheck::invalid_value;
-    };
-    const auto byte = static_cast<std::int8_t>(value[0]);
-    const unsigned word = value.size() > 1 ? value[0] | value[1] << 8 : value[0];
-    switch (index) {
-    case object::modes_of_operation: {
-        const bool supported = (values_.supported_modes & bit_of(static_cast<Mode>(byte))) != 0;
-        return valid(byte == 0 || supported);
+    const unsigned number = value.size() > 1 ? value[0] | value[1] << 8 : value[0];
+    if (!is_supported(index, number)) return WriteCheck::invalid_value;
+    if (scales_set_points(index) && torque_on()) return WriteCheck::wrong_state;
+    if (index == object::interpolation_data && modes_.records_full()) {
+        return WriteCheck::buffer_full;
     }
-    case object::homing_method: return valid(byte == 0 || HomingSearch::supports(byte));
-    case object::motion_profile_type: return valid(word == linear_ramps || word == jerk_limited);
-    case object::profile_jerk_use: return valid(byte == 1);  // one jerk for all corners
-    case object::torque_profile_type:  // linear only
-    case object::interpolation_submode: return valid(word == 0);
-    case object::touch_probe_function: return valid((word & 0xc8c8) == 0);
-    case object::positioning_option: return valid((word & 0xff3c) == 0 && (word & 3) != 3);
-    case object::interpolation_data:
-        return modes_.records_full() ? WriteCheck::buffer_full : WriteCheck::accepted;
-    case object::polarity:
-        if ((byte & 0x3f) != 0) return WriteCheck::invalid_value;
-        [[fallthrough]];
-    case object::position_encoder_resolution:
-    case object::gear_ratio:
-    case object::feed_constant:
-    case object::velocity_factor:
-    case object::acceleration_factor:
-        // the unit of the set-point would change
-        return torque_on() ? WriteCheck::wrong_state : WriteCheck::accepted;
-    default: return WriteCheck::accepted;
+    return WriteCheck::accepted;
+}
+
+bool DriveAxis::is_supported(std::uint16_t index, unsigned value) const noexcept {
+    const auto signed_byte = static_cast<std::int8_t>(value);
+    switch (index) {
+    case object::modes_of_operation:
+        return signed_byte == 0 ||
+               (values_.supported_modes & bit_of(static_cast<Mode>(signed_byte))) != 0;
+    case object::homing_method: return signed_byte == 0 || HomingSearch::supports(signed_byte);
+    case object::motion_profile_type: return value == linear_ramps || value == jerk_limited;
+    case object::torque_profile_type:
+    case object::interpolation_submode: return value == linear_ramps;
+    case object::profile_jerk_use: return value == 1;  // one jerk for all corners
+    case object::touch_probe_function: return (value & reserved_touch_probe_bits) == 0;
+    case object::positioning_option:
+        return (value & reserved_positioning_bits) == 0 &&
+               (value & relative_positioning_bits) != relative_positioning_bits;
+    case object::polarity: return (value & reserved_polarity_bits) == 0;
+    default: return true;
     }
 }
 

@@ -76,6 +76,8 @@ private:
         State then;
     };
 
+    /// Returns whether the axis supports a value of at most two bytes of an object.
+    bool is_supported(std::uint16_t index, unsigned value) const noexcept;
     void accept_controlword() noexcept;
     void command_written() noexcept;
     void command_ready(Command) noexcept;
