@@ -459,8 +459,7 @@ private:
         children(node, {"pdo"}, [&](const Xml& pdo) {
             attributes(pdo, {"idx"});
             master::Pdo p;
-            p.index =
-                static_cast<std::uint16_t>(number(pdo, "idx", 1, 0xffff, true, true).value_or(0));
+            p.index = static_cast<std::uint16_t>(required_hex(pdo, "idx", 1, 0xffff));
             p.write_mapping = configure_;
             children(pdo, {"pdoEntry"}, [&](const Xml& e) { entry(e, sm, p); });
             sm.pdos.push_back(std::move(p));
@@ -470,48 +469,61 @@ private:
         }
     }
 
-    void entry(const Xml& node, const master::SyncManager& sm, master::Pdo& to) {
+    /// Reads a <pdoEntry>: a value, or with halType="complex" the parts of one.
+    void entry(const Xml& node, const master::SyncManager& sm, master::Pdo& pdo) {
         attributes(node, {"idx", "subIdx", "bitLen", "halType", "halPin", "scale", "offset"});
-        master::Entry e;
-        e.index =
-            static_cast<std::uint16_t>(number(node, "idx", 0, 0xffff, true, true).value_or(0));
-        e.sub = static_cast<std::uint8_t>(
-            number(node, "subIdx", 0, 0xff, true, e.index != 0).value_or(0));
-        const auto bits =
-            static_cast<std::uint16_t>(number(node, "bitLen", 1, 255, false, true).value_or(8));
-        if (std::string_view(node.attribute("halType").value()) != "complex") {
-            children(node, {}, [](const Xml&) {});
-            return typed(node, sm, e, bits, to);
-        }
+        master::Entry entry;
+        entry.index = static_cast<std::uint16_t>(required_hex(node, "idx", 0, 0xffff));
+        const bool is_gap = entry.index == 0;
+        entry.sub =
+            static_cast<std::uint8_t>(is_gap ? number(node, "subIdx", 0, 0xff, true).value_or(0)
+                                             : required_hex(node, "subIdx", 0, 0xff));
+        const std::uint16_t bits = bit_length(node, 255, 8);
+        const bool is_complex = std::string_view(node.attribute("halType").value()) == "complex";
+        if (is_complex) return complex_entry(node, sm, entry, bits, pdo);
+        children(node, {}, [](const Xml&) {});
+        typed(node, sm, entry, bits, pdo);
+    }
+
+    /// Adds an entry for each <complexEntry> of a <pdoEntry>, and one for the bits behind the last.
+    /// All of them are parts of the object of the first.
+    void complex_entry(const Xml& node, const master::SyncManager& sm, const master::Entry& entry,
+                       std::uint16_t bits, master::Pdo& pdo) {
         if (node.attribute("halPin")) {
             error(Topic::value, node, "an entry of halType complex has no pin of its own",
                   "write halPin in its <complexEntry> elements");
         }
+        const std::size_t first = pdo.entries.size();
         unsigned used = 0;
-        const std::size_t first = to.entries.size();
         children(node, {"complexEntry"}, [&](const Xml& part) {
             attributes(part, {"bitLen", "halType", "halPin", "scale", "offset"});
-            const auto length =
-                static_cast<std::uint16_t>(number(part, "bitLen", 1, 32, false, true).value_or(1));
+            const std::uint16_t length = bit_length(part, 32, 1);
             used += length;
-            if (used <= bits) {
-                typed(part, sm, e, length, to);
-            } else {
-                error(
-                    Topic::value, part,
-                    "the <complexEntry> elements have more bits than their <pdoEntry>, which has " +
-                        std::to_string(bits),
-                    "correct bitLen");
-            }
+            if (used <= bits) return typed(part, sm, entry, length, pdo);
+            error(Topic::value, part,
+                  "the <complexEntry> elements have more bits than their <pdoEntry>, which has " +
+                      std::to_string(bits),
+                  "correct bitLen");
         });
         if (used < bits) {
-            master::Entry rest = e;
+            master::Entry rest = entry;
             rest.bits = static_cast<std::uint16_t>(bits - used);
-            to.entries.push_back(std::move(rest));
+            pdo.entries.push_back(std::move(rest));
         }
-        for (std::size_t i = first; i < to.entries.size(); ++i) {
-            to.entries[i].part = i != first;
+        for (std::size_t i = first; i < pdo.entries.size(); ++i) {
+            pdo.entries[i].part = i != first;
         }
+    }
+
+    /// Returns a hexadecimal attribute; 0 after reporting that it is missing or invalid.
+    std::int64_t required_hex(const Xml& node, const char* name, std::int64_t min,
+                              std::int64_t max) {
+        return number(node, name, min, max, true, true).value_or(0);
+    }
+    /// Returns bitLen of an entry; `fallback` after reporting that it is missing or invalid.
+    std::uint16_t bit_length(const Xml& node, std::int64_t max, std::uint16_t fallback) {
+        const auto bits = number(node, "bitLen", 1, max, false, true);
+        return static_cast<std::uint16_t>(bits.value_or(fallback));
     }
 
     /// Adds an entry, or `bits` single bits if it is a `bit` of several.

@@ -39,66 +39,91 @@ void SlaveWrites::read() {
 /// `register 0420 u16 = 1000`.
 void SlaveWrites::sdo(const Line& line, const std::vector<Word>& words) {
     const bool is_register = words[0].text == "register";
-    auto at = parse_address(words[1], in_.report);
-    if (!at && !is_register) {
-        at = pdos_.find(words[1].text);
-    }
-    if (!at || words.size() > 3) {
-        return in_.report.error(Topic::value, line.key.at,
-                                "invalid " + words[0].text + " '" +
-                                    line.key.text.substr(words[0].text.size() + 1) + "'",
-                                is_register
-                                    ? "write register 0420 u16 = 1000"
-                                    : "write sdo 6060 = 8, with a name: sdo gear-ratio-1 = 5, or "
-                                      "with a type: sdo 2000:1 u16 = 5");
-    }
-    StartupWrite w = startup_write(at->index, at->sub, {}, State::safeop);
-    w.line = line.key.at.line;
+    const std::optional<ObjectAddress> address = address_of(words[1], is_register);
+    if (!address || words.size() > 3) return reject_key(line, words[0].text);
+    StartupWrite write = startup_write(address->index, address->sub, {}, State::safeop);
+    write.line = line.key.at.line;
     if (is_register) {
-        w.protocol = StartupWrite::Protocol::reg;
+        write.protocol = StartupWrite::Protocol::reg;
     }
-    const std::string how = words.size() == 3 ? words[2].text : "";
-    if (how == "complete" || how == "raw") {
+    const std::string form = words.size() == 3 ? words[2].text : "";
+    if (form == "complete" || form == "raw") {
         const auto data = esi::hex_bytes(line.value.text);
         if (!data || data->empty()) {
             return in_.keys.reject(line,
                                    "hexadecimal bytes in the order of the wire, as in 01 00 E8 03");
         }
-        w.complete = how == "complete";
-        w.data = *data;
-        in_.slave.startup.push_back(std::move(w));
+        write.complete = form == "complete";
+        write.data = *data;
+    } else if (const auto data = typed_value(line, words, *address)) {
+        write.data = *data;
+    } else {
         return;
     }
-    Known known = is_register ? Known{} : pdos_.known(at->index, at->sub);
-    auto type = how.empty() ? std::nullopt : parse_type(words[2], in_.report);
-    if (!how.empty() && !type) {
-        return in_.report.error(
-            Topic::value, words[2].at, "unknown type '" + how + "'",
-            "the types are " + std::string(value_type_names) + ", complete and raw");
-    }
-    const std::string label =
-        is_register ? "register " + words[1].text : "object " + object_text(at->index, at->sub);
-    if (!type && known.bits == 0) {
-        return in_.report.error(
-            Topic::object, line.key.at,
-            device_ != nullptr && !is_register
-                ? label + " is not in the description of '" + in_.info.type + "'"
-                : label + " has no known type",
-            "write its type, as in " + words[0].text + " " + words[1].text +
-                " u16 = " + line.value.text);
-    }
-    if (!type) {
-        type = DataType{known.type, std::min(known.bits, 64U)};
-    }
-    std::string problem;
-    const auto data = value_bytes(line.value.text, *type, problem);
+    in_.slave.startup.push_back(std::move(write));
+}
+
+/// Parses `6060`, `2000:1` or, but for a register, the name of a pin.
+std::optional<ObjectAddress> SlaveWrites::address_of(const Word& word, bool is_register) {
+    const auto address = parse_address(word, in_.report);
+    if (address || is_register) return address;
+    return pdos_.find(word.text);
+}
+
+void SlaveWrites::reject_key(const Line& line, const std::string& kind) {
+    const char* const help = kind == "register"
+                                 ? "write register 0420 u16 = 1000"
+                                 : "write sdo 6060 = 8, with a name: sdo gear-ratio-1 = 5, or "
+                                   "with a type: sdo 2000:1 u16 = 5";
+    in_.report.error(Topic::value, line.key.at,
+                     "invalid " + kind + " '" + line.key.text.substr(kind.size() + 1) + "'", help);
+}
+
+/// Returns the bytes of the value of `sdo ADDRESS [TYPE] = VALUE`, or nullopt after reporting the
+/// reason.
+std::optional<std::vector<std::uint8_t>> SlaveWrites::typed_value(const Line& line,
+                                                                  const std::vector<Word>& words,
+                                                                  const ObjectAddress& address) {
+    const bool is_register = words[0].text == "register";
+    const std::string label = is_register ? "register " + words[1].text
+                                          : "object " + object_text(address.index, address.sub);
+    const std::optional<DataType> type =
+        words.size() == 3 ? written_type(words[2]) : known_type(line, words, address, label);
+    if (!type) return std::nullopt;
+    std::string expected;
+    auto data = value_bytes(line.value.text, *type, expected);
     if (!data) {
-        return in_.report.error(Topic::value, line.value.at,
-                                "invalid value '" + line.value.text + "' of " + label,
-                                "write " + problem);
+        in_.report.error(Topic::value, line.value.at,
+                         "invalid value '" + line.value.text + "' of " + label,
+                         "write " + expected);
     }
-    w.data = *data;
-    in_.slave.startup.push_back(std::move(w));
+    return data;
+}
+
+std::optional<DataType> SlaveWrites::written_type(const Word& word) {
+    const auto type = parse_type(word, in_.report);
+    if (!type) {
+        in_.report.error(Topic::value, word.at, "unknown type '" + word.text + "'",
+                         "the types are " + std::string(value_type_names) + ", complete and raw");
+    }
+    return type;
+}
+
+/// Returns the type of an object from the description of the device, or that of the pin which has
+/// it.
+std::optional<DataType> SlaveWrites::known_type(const Line& line, const std::vector<Word>& words,
+                                                const ObjectAddress& address,
+                                                const std::string& label) {
+    const bool is_register = words[0].text == "register";
+    const Known known = is_register ? Known{} : pdos_.known(address.index, address.sub);
+    if (known.bits != 0) return DataType{known.type, std::min(known.bits, 64U)};
+    const bool is_described = device_ != nullptr && !is_register;
+    in_.report.error(Topic::object, line.key.at,
+                     is_described ? label + " is not in the description of '" + in_.info.type + "'"
+                                  : label + " has no known type",
+                     "write its type, as in " + words[0].text + " " + words[1].text +
+                         " u16 = " + line.value.text);
+    return std::nullopt;
 }
 
 /// Adds a write of hexadecimal bytes.

@@ -19,6 +19,14 @@ public:
 private:
     using Protocol = master::StartupWrite::Protocol;
     void sdo(const Line& line, const std::vector<Word>& words);
+    std::optional<ObjectAddress> address_of(const Word& word, bool is_register);
+    void reject_key(const Line& line, const std::string& kind);
+    std::optional<std::vector<std::uint8_t>> typed_value(const Line& line,
+                                                         const std::vector<Word>& words,
+                                                         const ObjectAddress& address);
+    std::optional<DataType> written_type(const Word& word);
+    std::optional<DataType> known_type(const Line& line, const std::vector<Word>& words,
+                                       const ObjectAddress& address, const std::string& label);
     void idn(const Line& line, const std::vector<Word>& words);
     void aoe(const Line& line, const std::vector<Word>& words);
     void bytes_write(const Line& line, Protocol protocol, unsigned index, unsigned sub,
