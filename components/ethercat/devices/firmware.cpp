@@ -479,38 +479,47 @@ void Firmware::watch(esc::Pdi& pdi) noexcept {
 }
 
 void Firmware::enter(esc::Pdi& pdi, State to) noexcept {
-    const bool leaves_op = state_ == State::op && to != State::op;
+    const State from = state_;
+    const bool leaves_op = from == State::op && to != State::op;
     if (leaves_op) {
         clear_outputs();
     }
-    if (to == State::init) {
-        mailbox_.stop();
-    }
-    if (to == State::boot) {
-        mailbox_.start(design_.sii.boot);
-    }
-    if (to == State::preop && state_ == State::init && design_.sii.has_mailbox()) {
-        mailbox_.start(design_.sii.mailboxes);
-    }
-    if (to == State::safeop && state_ == State::preop) {
-        const auto& sync = pdi.sync();
-        received_ = false;
-        last_step_ns_ = now_ns_;
-        pulses_ = sync.active ? sync.pulses : 0;
-        sync1_pulses_ = sync.sync1_pulses;
-        sample_ = 0;
-        state_ = to;
-        step(pdi, 0);  // inputs are valid in SAFE-OP
-    }
+    switch_mailbox(from, to);
     state_ = to;
-    if (to != State::op) {
-        received_ = received_ && to == State::safeop;
+    if (from == State::preop && to == State::safeop) {
+        start_application(pdi);
+    }
+    const bool keeps_outputs = to == State::op || to == State::safeop;
+    if (!keeps_outputs) {
+        received_ = false;
     }
     shown_.store(to, std::memory_order_relaxed);
     if (leaves_op) {
         step(pdi, 0);  // below SAFE-OP it is the last one: outputs are off
     }
     pdi.set_al_status(static_cast<std::uint16_t>(to), 0);
+}
+
+/// Starts or stops the mailbox that a state has: none in INIT, that of BOOT, or the standard one.
+void Firmware::switch_mailbox(State from, State to) noexcept {
+    if (to == State::init) {
+        mailbox_.stop();
+    } else if (to == State::boot) {
+        mailbox_.start(design_.sii.boot);
+    } else if (from == State::init && to == State::preop && design_.sii.has_mailbox()) {
+        mailbox_.start(design_.sii.mailboxes);
+    }
+}
+
+/// Begins the exchange of process data: inputs are valid in SAFE-OP.
+void Firmware::start_application(esc::Pdi& pdi) noexcept {
+    const auto& sync = pdi.sync();
+    received_ = false;
+    last_step_ns_ = now_ns_;
+    pulses_ = sync.active ? sync.pulses : 0;
+    sync1_pulses_ = sync.sync1_pulses;
+    sample_ = 0;
+    step(pdi, 0);
 }
 
 void Firmware::fail(esc::Pdi& pdi, State stay, std::uint16_t code) noexcept {

@@ -152,6 +152,8 @@ private:
     void wait_for_op(esc::Pdi&) noexcept;
     void watch(esc::Pdi&) noexcept;
     void enter(esc::Pdi&, State) noexcept;
+    void switch_mailbox(State from, State to) noexcept;
+    void start_application(esc::Pdi&) noexcept;
     void fail(esc::Pdi&, State stay, std::uint16_t code) noexcept;
 
     // Process data.

@@ -91,49 +91,55 @@ void FoeServer::take(const MailboxMessage& message, State state, Outbox& out) no
         return out.send(MailboxType::error,
                         write_mailbox_error(out.payload(), MailboxError::too_short));
     }
+    const bool is_sending = file_ != nullptr && !writing_;
     switch (m->opcode) {
     case foe::Opcode::read: return open(*m, false, state, out);
     case foe::Opcode::write: return open(*m, true, state, out);
-    case foe::Opcode::data: {
-        if (file_ == nullptr || !writing_) return refuse(out, foe::Error::illegal);
-        if (m->value != packet_ + 1) return refuse(out, foe::Error::packet_number);
-        if (busy_every_ != 0 && m->value % busy_every_ == 0 && !busy_) {
-            busy_ = true;
-            return send(out, foe::Opcode::busy, 100U << 16);
-        }
-        busy_ = false;
-        if (m->data.size() > file_->bytes.size() - at_) return refuse(out, foe::Error::disk_full);
-        if (!m->data.empty()) {
-            std::memcpy(file_->bytes.data() + at_, m->data.data(), m->data.size());
-        }
-        at_ += m->data.size();
-        packet_ = m->value;
-        send(out, foe::Opcode::ack, packet_);
-        // both mailboxes have the same size
-        if (m->data.size() < foe::packet_capacity(out.mailbox())) {
-            file_->length = at_;
-            file_ = nullptr;
+    case foe::Opcode::data: return receive_packet(*m, out);
+    case foe::Opcode::ack:
+        if (is_sending) {
+            acknowledge_packet(*m, out);
         }
         return;
-    }
-    case foe::Opcode::ack:
-        if (file_ == nullptr || writing_) return;
-        if (m->value != packet_) return refuse(out, foe::Error::packet_number);
-        at_ += last_;
-        if (last_ < foe::packet_capacity(out.mailbox())) {
-            file_ = nullptr;
-            return;
-        }
-        ++packet_;
-        return send_packet(out);
     case foe::Opcode::busy:
-        if (file_ != nullptr && !writing_) {
+        if (is_sending) {
             send_packet(out);
         }
         return;
     case foe::Opcode::error: file_ = nullptr; return;
     }
     refuse(out, foe::Error::illegal);
+}
+
+/// Appends a packet to the file that is written. A packet shorter than a mailbox is the last one.
+void FoeServer::receive_packet(const foe::Message& m, Outbox& out) noexcept {
+    if (file_ == nullptr || !writing_) return refuse(out, foe::Error::illegal);
+    if (m.value != packet_ + 1) return refuse(out, foe::Error::packet_number);
+    const bool is_busy_due = busy_every_ != 0 && m.value % busy_every_ == 0;
+    busy_ = is_busy_due && !busy_;
+    if (busy_) return send(out, foe::Opcode::busy, 100U << 16);  // the master repeats the packet
+    if (m.data.size() > file_->bytes.size() - at_) return refuse(out, foe::Error::disk_full);
+    std::copy(m.data.begin(), m.data.end(), file_->bytes.data() + at_);
+    at_ += m.data.size();
+    packet_ = m.value;
+    send(out, foe::Opcode::ack, packet_);
+    // both mailboxes have the same size
+    if (m.data.size() < foe::packet_capacity(out.mailbox())) {
+        file_->length = at_;
+        file_ = nullptr;
+    }
+}
+
+/// Sends the packet behind the acknowledged one, unless that was the last one.
+void FoeServer::acknowledge_packet(const foe::Message& m, Outbox& out) noexcept {
+    if (m.value != packet_) return refuse(out, foe::Error::packet_number);
+    at_ += last_;
+    if (last_ < foe::packet_capacity(out.mailbox())) {
+        file_ = nullptr;
+        return;
+    }
+    ++packet_;
+    send_packet(out);
 }
 
 }  // namespace hal::ethercat::devices

@@ -42,6 +42,8 @@ private:
     File* find(std::string_view name) noexcept;
     File* rename_new(std::string_view name) noexcept;
     void open(const foe::Message&, bool write, State, Outbox&) noexcept;
+    void receive_packet(const foe::Message&, Outbox&) noexcept;
+    void acknowledge_packet(const foe::Message&, Outbox&) noexcept;
     void send_packet(Outbox&) noexcept;
     static void send(Outbox&, foe::Opcode, std::uint32_t value) noexcept;
     void refuse(Outbox&, foe::Error) noexcept;

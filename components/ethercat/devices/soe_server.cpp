@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cstring>
+#include <optional>
+#include <span>
 #include <utility>
 
 namespace hal::ethercat::devices {
@@ -16,6 +18,58 @@ unsigned phase_of(State state) noexcept {
     case State::safeop: return 1;
     default: return 0;
     }
+}
+
+/// An error code of SoE; nullopt: none.
+using SoeError = std::optional<std::uint16_t>;
+
+// A list is sent with the lengths of its value and of its capacity before the elements.
+constexpr std::size_t list_header_bytes = 4;
+
+/// Checks that the master may write the elements of a request, in this state.
+SoeError access_error(const soe::Header& h, const Idn& idn, State state) noexcept {
+    if (h.elements == 0) return soe::error::no_element;
+    if (h.elements != soe::element::value) return soe::error::name_read_only;
+    const soe::Attribute attribute = idn.attribute;
+    const bool is_read_only = attribute.write_protected(0) && attribute.write_protected(2);
+    if (is_read_only) return soe::error::read_only;
+    if (attribute.write_protected(phase_of(state))) return soe::error::protected_now;
+    return std::nullopt;
+}
+
+/// Checks that the bytes are a list of at most the capacity, or a value of the exact size.
+SoeError length_error(const Idn& idn, std::span<const std::uint8_t> written) noexcept {
+    if (!idn.attribute.list()) {
+        if (written.size() > idn.attribute.bytes()) return soe::error::too_long;
+        if (written.size() < idn.attribute.bytes()) return soe::error::too_short;
+        return std::nullopt;
+    }
+    if (written.size() > list_header_bytes + idn.value.size()) return soe::error::too_long;
+    if (written.size() < list_header_bytes) return soe::error::too_short;
+    const std::size_t announced = get<std::uint16_t>(written.data());
+    if (announced > written.size() - list_header_bytes) return soe::error::too_short;
+    return std::nullopt;
+}
+
+/// Returns the value in bytes that length_error() accepts: for a list, its elements.
+std::span<const std::uint8_t> value_of(const Idn& idn,
+                                       std::span<const std::uint8_t> written) noexcept {
+    if (!idn.attribute.list()) return written;
+    return written.subspan(list_header_bytes, get<std::uint16_t>(written.data()));
+}
+
+/// Checks a value against the limits of its IDN.
+SoeError limit_error(const Idn& idn, std::span<const std::uint8_t> value) noexcept {
+    const bool has_limits = idn.low != idn.high;
+    if (!has_limits) return std::nullopt;
+    std::int64_t number = 0;
+    std::memcpy(&number, value.data(), std::min<std::size_t>(value.size(), sizeof number));
+    if (idn.attribute.is_signed() && value.size() == 4) {
+        number = static_cast<std::int32_t>(number);
+    }
+    if (number < idn.low) return soe::error::below_minimum;
+    if (number > idn.high) return soe::error::above_maximum;
+    return std::nullopt;
 }
 
 }  // namespace
@@ -139,43 +193,18 @@ void SoeServer::write(const soe::Header& h, std::span<const std::uint8_t> data, 
         written_ = 0;
         return refuse(h, soe::error::too_long, out);
     }
-    if (!data.empty()) {
-        std::memcpy(buffer_.data() + written_, data.data(), data.size());
-    }
+    std::copy(data.begin(), data.end(), buffer_.data() + written_);
     written_ += data.size();
     if (h.incomplete) return;
-    const std::size_t length = std::exchange(written_, 0);
-    Idn* idn = find(h.drive, h.idn);
+    const std::span<const std::uint8_t> written(buffer_.data(), std::exchange(written_, 0));
+    Idn* const idn = find(h.drive, h.idn);
     if (idn == nullptr) return refuse(h, soe::error::no_idn, out);
-    if (h.elements != soe::element::value) {
-        return refuse(h, h.elements == 0 ? soe::error::no_element : soe::error::name_read_only,
-                      out);
-    }
-    if (idn->attribute.write_protected(0) && idn->attribute.write_protected(2)) {
-        return refuse(h, soe::error::read_only, out);
-    }
-    if (idn->attribute.write_protected(phase_of(state)))
-        return refuse(h, soe::error::protected_now, out);
-    const std::size_t head = idn->attribute.list() ? 4 : 0;
-    const std::size_t max =
-        idn->attribute.list() ? head + idn->value.size() : idn->attribute.bytes();
-    const std::size_t min = idn->attribute.list() ? head : idn->attribute.bytes();
-    if (length > max) return refuse(h, soe::error::too_long, out);
-    if (length < min || (head != 0 && get<std::uint16_t>(buffer_.data()) > length - head)) {
-        return refuse(h, soe::error::too_short, out);
-    }
-    const std::size_t bytes = head != 0 ? get<std::uint16_t>(buffer_.data()) : length;
-    if (idn->low != idn->high) {
-        std::int64_t value = 0;
-        std::memcpy(&value, buffer_.data(), std::min<std::size_t>(bytes, 8));
-        if (idn->attribute.type() == 2 && bytes == 4) {
-            value = static_cast<std::int32_t>(value);
-        }
-        if (value < idn->low) return refuse(h, soe::error::below_minimum, out);
-        if (value > idn->high) return refuse(h, soe::error::above_maximum, out);
-    }
-    std::memcpy(idn->value.data(), buffer_.data() + head, bytes);
-    idn->length = bytes;
+    if (const auto error = access_error(h, *idn, state)) return refuse(h, *error, out);
+    if (const auto error = length_error(*idn, written)) return refuse(h, *error, out);
+    const std::span<const std::uint8_t> value = value_of(*idn, written);
+    if (const auto error = limit_error(*idn, value)) return refuse(h, *error, out);
+    std::copy(value.begin(), value.end(), idn->value.begin());
+    idn->length = value.size();
     soe::Header answer = h;
     answer.opcode = soe::Opcode::write_response;
     soe::write(out.payload(), answer);

@@ -90,6 +90,7 @@ struct Attribute {
     constexpr bool list() const noexcept { return (raw >> 18 & 1) != 0; }
     constexpr bool command() const noexcept { return (raw >> 19 & 1) != 0; }
     constexpr unsigned type() const noexcept { return raw >> 20 & 7; }
+    constexpr bool is_signed() const noexcept { return type() == 2; }
     constexpr unsigned decimals() const noexcept { return raw >> 24 & 15; }
     /// Returns whether writing is denied in PRE-OP (0), SAFE-OP (1) or OP (2).
     constexpr bool write_protected(unsigned state) const noexcept {
