@@ -19,6 +19,11 @@ namespace {
 constexpr std::size_t max_message = ecat_header_bytes + max_mailbox;
 constexpr std::size_t max_pending = 16;
 
+// of the list for poll()
+constexpr std::size_t udp_slot = 0;
+constexpr std::size_t tcp_slot = 1;
+constexpr std::size_t first_client_slot = 2;
+
 int open_socket(int type, const std::string& address, std::uint16_t port, std::string& problem) {
     sockaddr_in at{};
     at.sin_family = AF_INET;
@@ -118,47 +123,72 @@ Gateway::~Gateway() {
 }
 
 void Gateway::run() {
+    // Answers come from the cycle, which wakes nobody: while some are pending, look often.
+    constexpr int idle_ms = 50;
+    constexpr int pending_ms = 1;
     std::vector<pollfd> polled;
     while (!stop_) {
-        polled.assign(1, {udp_, POLLIN, 0});
-        polled.push_back({tcp_, POLLIN, 0});  // a negative one is ignored
-        for (const auto& client : clients_) {
-            polled.push_back({client->fd, static_cast<short>(client->input_ended ? 0 : POLLIN), 0});
-        }
-        ::poll(polled.data(), polled.size(), pending_.empty() ? 50 : 1);
-        // closed by another part of the process; poll() would not sleep any more
-        for (int* const own : {&udp_, &tcp_}) {
-            if ((polled[own == &udp_ ? 0 : 1].revents & POLLNVAL) != 0) {
-                *own = -1;
-            }
-        }
-        if (polled[0].revents != 0) {
+        list_polled(polled);
+        ::poll(polled.data(), polled.size(), pending_.empty() ? idle_ms : pending_ms);
+        forget_closed(polled[udp_slot], udp_);
+        forget_closed(polled[tcp_slot], tcp_);
+        if (polled[udp_slot].revents != 0) {
             read_udp();
         }
-        for (std::size_t i = 2; i < polled.size(); ++i) {
-            Client& client = *clients_[i - 2];
-            if ((polled[i].revents & POLLIN) != 0) {
-                read_tcp(client);
-            } else if (polled[i].revents != 0) {
-                close(std::exchange(client.fd, -1));
-            }
-            if (client.input_ended && client.fd >= 0 && !is_waiting(client)) {
-                close(std::exchange(client.fd, -1));
-            }
+        for (std::size_t n = 0; n < clients_.size(); ++n) {
+            serve(*clients_[n], polled[first_client_slot + n].revents);
         }
         std::erase_if(clients_, [](const auto& client) { return client->fd < 0; });
-        if (polled[1].revents != 0) {
-            const int fd = accept4(tcp_, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
-            if (fd >= 0 && clients_.size() < setup_.max_clients) {
-                clients_.push_back(std::make_unique<Client>());
-                clients_.back()->fd = fd;
-                clients_.back()->id = next_client_++;
-            } else if (fd >= 0) {
-                close(fd);
-            }
+        if (polled[tcp_slot].revents != 0) {
+            accept_client();
         }
         collect();
     }
+}
+
+/// Lists what poll() waits for: both sockets, of which poll() ignores a negative one, and the
+/// clients in the order of clients_.
+void Gateway::list_polled(std::vector<pollfd>& polled) const {
+    polled.resize(first_client_slot);
+    polled[udp_slot] = {udp_, POLLIN, 0};
+    polled[tcp_slot] = {tcp_, POLLIN, 0};
+    for (const auto& client : clients_) {
+        const int events = client->input_ended ? 0 : POLLIN;
+        polled.push_back({client->fd, static_cast<short>(events), 0});
+    }
+}
+
+/// Forgets a socket that another part of the process has closed: poll() would not wait any more.
+void Gateway::forget_closed(const pollfd& polled, int& fd) {
+    if ((polled.revents & POLLNVAL) != 0) {
+        fd = -1;
+    }
+}
+
+/// Reads the requests of a client. Closes it when its connection is lost, and when it has ended its
+/// input and has all its answers.
+void Gateway::serve(Client& client, short events) {
+    if ((events & POLLIN) != 0) {
+        read_tcp(client);
+    } else if (events != 0) {
+        close(std::exchange(client.fd, -1));
+    }
+    const bool is_open = client.fd >= 0;
+    if (is_open && client.input_ended && !is_waiting(client)) {
+        close(std::exchange(client.fd, -1));
+    }
+}
+
+void Gateway::accept_client() {
+    const int fd = accept4(tcp_, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
+    if (fd < 0) return;
+    if (clients_.size() >= setup_.max_clients) {
+        close(fd);
+        return;
+    }
+    clients_.push_back(std::make_unique<Client>());
+    clients_.back()->fd = fd;
+    clients_.back()->id = next_client_++;
 }
 
 void Gateway::read_udp() {

@@ -16,6 +16,8 @@
 
 #include "ethercat/master/request_queue.hpp"
 
+struct pollfd;
+
 namespace hal::ethercat::master {
 
 /// A slave as the gateway offers it: found by its station address, described in the master's own
@@ -110,6 +112,10 @@ private:
     struct Client;
     struct Pending;
     void run();
+    void list_polled(std::vector<pollfd>& polled) const;
+    static void forget_closed(const pollfd& polled, int& fd);
+    void serve(Client& client, short events);
+    void accept_client();
     void take(std::span<const std::uint8_t> bytes, const Sender& sender);
     void answer(const Sender& sender, std::span<const std::uint8_t> message);
     void read_udp();

@@ -41,63 +41,81 @@ bool accepts_next_fragment(const Expected& expected,
            coe::read_information(payload)->fragments_left + 1U == expected.second;
 }
 
+/// The bytes of a response that consists of fragments: those of the description to `head`, all
+/// others to `rest`.
+class FragmentBuffer {
+public:
+    FragmentBuffer(std::span<std::uint8_t> head, std::span<std::uint8_t> rest)
+        : head_(head), rest_(rest) {}
+
+    /// Appends the data of a fragment. Returns false if the first one is shorter than the head. What
+    /// does not fit is dropped, so that the mailbox is read to the end.
+    bool append(std::span<const std::uint8_t> data) noexcept {
+        if (!has_head_) {
+            if (data.size() < head_.size()) return false;
+            std::copy_n(data.begin(), head_.size(), head_.begin());
+            data = data.subspan(head_.size());
+            has_head_ = true;
+        }
+        const std::size_t fitting = std::min(data.size(), rest_.size() - used_);
+        overflowed_ = overflowed_ || fitting < data.size();
+        std::copy_n(data.begin(), fitting, rest_.begin() + static_cast<std::ptrdiff_t>(used_));
+        used_ += fitting;
+        return true;
+    }
+    /// Returns the number of bytes in `rest`.
+    std::size_t used() const noexcept { return used_; }
+    bool overflowed() const noexcept { return overflowed_; }
+
+private:
+    std::span<std::uint8_t> head_;
+    std::span<std::uint8_t> rest_;
+    std::size_t used_ = 0;
+    bool has_head_ = false;
+    bool overflowed_ = false;
+};
+
 }  // namespace
 
-// Joins the fragments of a response: the first `head.size()` bytes of the first one to `head`, all
-// others to `to`.
+// `key` is what the request asks for, as `key_bytes` bytes: a list, or an index and a sub-index. The
+// first fragment repeats it.
 Task<MailboxResult> ObjectInformation::fetch(Channel& channel, BusSlave& slave,
-                                             coe::Information request, std::uint32_t what,
-                                             std::size_t what_bytes, std::span<std::uint8_t> head,
-                                             std::span<std::uint8_t> to) noexcept {
+                                             coe::Information request, std::uint32_t key,
+                                             std::size_t key_bytes, std::span<std::uint8_t> head,
+                                             std::span<std::uint8_t> rest) noexcept {
     SlaveMailbox* mailbox = mailboxes_.find(slave);
     if (mailbox == nullptr) co_return refused();
     SlaveMailbox::Hold hold = co_await mailbox->hold(channel);
     const auto body = mailbox->body(slave);
     if (body.size() < coe::sdo_bytes) co_return refused();
     coe::write_information(body.data(), {request, false, 0});
-    std::memcpy(body.data() + coe::information_header_bytes, &what, what_bytes);
+    std::memcpy(body.data() + coe::information_header_bytes, &key, key_bytes);
     MailboxResult result = co_await mailbox->send(channel, slave, MailboxType::coe,
-                                                  coe::information_header_bytes + what_bytes);
+                                                  coe::information_header_bytes + key_bytes);
     if (!result) co_return result;
 
     // Each fragment announces how many follow, which distinguishes a duplicate from the next one.
-    const auto response = static_cast<coe::Information>(static_cast<unsigned>(request) + 1);
+    const std::uint32_t response = static_cast<std::uint32_t>(request) + 1;
     const std::int64_t timeout = SlaveMailbox::response_timeout_ns(slave);
-    std::size_t used = 0;
-    bool first = true;
-    Expected expected{accepts_first_fragment, static_cast<std::uint32_t>(response), what,
-                      static_cast<std::uint32_t>(what_bytes)};
-    bool overflow = false;
+    FragmentBuffer buffer(head, rest);
+    Expected expected{accepts_first_fragment, response, key, static_cast<std::uint32_t>(key_bytes)};
     for (;;) {
         result = co_await mailbox->wait_for(channel, slave, MailboxType::coe, timeout, expected);
         if (!result) co_return result;
         const auto payload = mailbox->reply().payload;
         const auto header = *coe::read_information(payload);
-        auto data = payload.subspan(coe::information_header_bytes);
+        const auto data = payload.subspan(coe::information_header_bytes);
         if (header.opcode == coe::Information::error) {
             co_return aborted(get<std::uint32_t>(data.data()));
         }
-        if (std::exchange(first, false)) {
-            if (data.size() < head.size()) co_return refused();
-            std::memcpy(head.data(), data.data(), head.size());
-            data = data.subspan(head.size());
-        }
-        if (data.size() > to.size() - used) {
-            overflow = true;
-            data = data.first(to.size() - used);
-        }
-        if (!data.empty()) {
-            std::memcpy(to.data() + used, data.data(), data.size());
-        }
-        used += data.size();
+        if (!buffer.append(data)) co_return refused();
         if (!header.incomplete) break;
-        expected = {accepts_next_fragment, static_cast<std::uint32_t>(response),
-                    header.fragments_left};
-        // more was announced, and nothing follows
-        if (header.fragments_left == 0) co_return refused();
+        const bool is_none_left = header.fragments_left == 0;
+        if (is_none_left) co_return refused();  // contradicts `incomplete`: nothing would follow
+        expected = {accepts_next_fragment, response, header.fragments_left};
     }
-    if (overflow) co_return refused(0, used);
-    co_return succeeded(used);
+    if (buffer.overflowed()) co_return refused(0, buffer.used());
+    co_return succeeded(buffer.used());
 }
 
 Task<MailboxResult> ObjectInformation::list(Channel& channel, BusSlave& slave, coe::List which,

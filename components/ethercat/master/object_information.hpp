@@ -42,9 +42,11 @@ public:
                               EntryDescription& description, std::span<char> name) noexcept;
 
 private:
-    Task<MailboxResult> fetch(Channel&, BusSlave&, coe::Information request, std::uint32_t what,
-                              std::size_t what_bytes, std::span<std::uint8_t> head,
-                              std::span<std::uint8_t> to) noexcept;
+    /// Sends a request and joins the fragments of its response: the first `head.size()` bytes to
+    /// `head`, all others to `rest`; `length` of the result counts these.
+    Task<MailboxResult> fetch(Channel&, BusSlave&, coe::Information request, std::uint32_t key,
+                              std::size_t key_bytes, std::span<std::uint8_t> head,
+                              std::span<std::uint8_t> rest) noexcept;
 
     Mailboxes& mailboxes_;
 };

@@ -138,35 +138,46 @@ void WireEngine::transmit(std::int64_t now_ns, bool process_data, bool all_domai
     sent_after_ns_ = now_ns - cycle_start_ns_;
     now_ns_ = now_ns;
     std::size_t cyclic_bytes = 0;
-    // Frames behind the first one leave later than at this time, and slaves before the reference
-    // clock follow it. They distribute it all the same while the first one may be lost.
-    const bool first_returned = clock_.fresh;
-    std::optional<std::uint64_t> time = dc_time_ns;
     if (process_data) {
-        const auto frames = image_.frames();
-        for (std::size_t n = 0; n < frames.size(); ++n) {
-            ProcessImage::Frame& frame = frames[n];
-            if (!all_domains && frame.every > 1 && cycle_ % frame.every != 0) continue;
-            const int index = take_index();
-            if (index < 0) break;
-            image_.fill(frame, static_cast<std::uint8_t>(index), time);
-            if (first_returned) {
-                time.reset();
-            }
-            Flight& f = flights_[static_cast<std::size_t>(index)];
-            f.copies = send({frame.bytes.data(), frame.size}, true);
-            cyclic_bytes += frame.size + frame_overhead;
-            f.place = static_cast<std::uint16_t>(n);
-            f.sent_ns = now_ns;
-            if (f.copies != 0) {
-                f.kind = Flight::Kind::cyclic;
-                ++in_flight_;
-            }
-        }
+        cyclic_bytes = send_process_data(all_domains, dc_time_ns);
         ++cycle_;
     }
     send_acyclic(acyclic_frames, wire_bytes_ - std::min(wire_bytes_, cyclic_bytes));
     sending_.clear(std::memory_order_release);
+}
+
+std::size_t WireEngine::send_process_data(bool all_domains, std::uint64_t dc_time_ns) noexcept {
+    // Frames behind the first one leave later than at this time, and slaves before the reference
+    // clock follow it: the first one alone distributes it. While it may be lost, all do.
+    const bool only_first_has_time = clock_.fresh;
+    std::optional<std::uint64_t> time = dc_time_ns;
+    std::size_t bytes = 0;
+    const auto frames = image_.frames();
+    for (std::size_t n = 0; n < frames.size(); ++n) {
+        ProcessImage::Frame& frame = frames[n];
+        const bool is_due = all_domains || frame.every <= 1 || cycle_ % frame.every == 0;
+        if (!is_due) continue;
+        const int index = take_index();
+        if (index < 0) break;
+        image_.fill(frame, static_cast<std::uint8_t>(index), time);
+        if (only_first_has_time) {
+            time.reset();
+        }
+        const std::uint8_t copies = send({frame.bytes.data(), frame.size}, true);
+        bytes += frame.size + frame_overhead;
+        if (copies != 0) {
+            track(index, {.kind = Flight::Kind::cyclic,
+                          .copies = copies,
+                          .place = static_cast<std::uint16_t>(n),
+                          .sent_ns = now_ns_});
+        }
+    }
+    return bytes;
+}
+
+void WireEngine::track(int index, const Flight& flight) noexcept {
+    flights_[static_cast<std::size_t>(index)] = flight;
+    ++in_flight_;
 }
 
 void WireEngine::send_now(std::span<const std::uint8_t> frame) noexcept {
@@ -194,57 +205,72 @@ void WireEngine::send_acyclic(unsigned frames, std::size_t bytes) noexcept {
             return;
         }
         bytes -= std::min<std::size_t>(bytes, frame.size + frame_overhead);
-        Flight& f = flights_[static_cast<std::size_t>(index)];
-        f.copies = send({frame.bytes.data(), frame.size}, backup);
-        f.place = static_cast<std::uint16_t>(place);
-        f.sent_ns = now_ns_;
-        f.kind = Flight::Kind::acyclic;
-        ++in_flight_;
+        track(index, {.kind = Flight::Kind::acyclic,
+                      .copies = send({frame.bytes.data(), frame.size}, backup),
+                      .place = static_cast<std::uint16_t>(place),
+                      .sent_ns = now_ns_});
         frame.free = false;
         --frames;
     }
 }
 
-/// Fills a frame of at most `max` bytes on the wire with waiting datagrams, in turn; the `first`
-/// one of a cycle may be longer. Those that count positions do not share a frame with others, as
-/// they leave on one port.
+/// Fills a frame of at most `max` bytes on the wire with waiting datagrams, the channels in turn.
+/// The `first` frame of a cycle may be longer for a single datagram. `backup`: whether the frame
+/// leaves on the backup port too. Returns false if nothing is waiting.
 bool WireEngine::pack(AcyclicFrame& frame, std::uint8_t index, bool& backup, std::size_t max,
                       bool first) noexcept {
     FrameWriter writer(frame.bytes, primary_->address());
     frame.count = 0;
     std::size_t bytes = first_datagram + frame_overhead;
     const std::size_t channels = channels_.size();
-    std::size_t at = next_channel_ < channels ? next_channel_ : 0;
-    std::size_t next = at;
-    for (std::size_t seen = 0; seen < channels && frame.count < max_items;
-         ++seen, at = at + 1 == channels ? 0 : at + 1) {
+    const std::size_t begin = next_channel_ < channels ? next_channel_ : 0;
+    std::size_t next = begin;
+    for (std::size_t n = 0; n < channels && frame.count < max_items; ++n) {
+        const std::size_t at = begin + n < channels ? begin + n : begin + n - channels;
         if (active_[at] == 0) continue;
-        Channel& c = *channels_[at];
-        if (c.stage() != Channel::Stage::waiting) continue;
-        const bool both = use_backup_ && backup_ != nullptr && !counts_positions(c.command());
-        if (frame.count != 0 && both != backup) continue;
-        const std::size_t needed = c.length() + datagram_overhead;
-        if (bytes + needed > max && !(first && frame.count == 0)) continue;
-        if (bytes + needed > setup_.frame_bytes + frame_overhead && frame.count != 0) continue;
-        if (c.length() > writer.space() || (c.length() == 0 && writer.space() == 0)) continue;
-        std::uint8_t* data = writer.add(c.command(), index, c.address(), c.length());
-        if (data == nullptr) continue;
-        if (!only_reads(c.command())) {
-            std::memcpy(data, c.data(), c.length());
-        }
-        backup = both;
+        Channel& channel = *channels_[at];
+        if (channel.stage() != Channel::Stage::waiting) continue;
+        const bool is_alone = frame.count == 0;
+        const bool on_backup = may_use_backup(channel.command());
+        if (!is_alone && on_backup != backup) continue;
+        const std::size_t needed = channel.length() + datagram_overhead;
+        if (bytes + needed > max && !(is_alone && first)) continue;
+        if (bytes + needed > setup_.frame_bytes + frame_overhead && !is_alone) continue;
+        if (!add_datagram(frame, writer, index, channel)) continue;
+        backup = on_backup;
         bytes += needed;
-        if (c.command() == Command::brd && c.address() == at_position(0, registers::al_status)) {
-            primary_wkc_ = -1;
-        }
-        c.set_sent(now_ns_);
-        frame.items[frame.count++] = {
-            &c, c.generation(), static_cast<std::uint16_t>(data - frame.bytes.data()), c.length()};
         next = at + 1;
     }
     next_channel_ = next;
     if (frame.count == 0) return false;
     frame.size = static_cast<std::uint16_t>(writer.finish().size());
+    return true;
+}
+
+/// Datagrams that count positions leave on one port, and do not share a frame with others.
+bool WireEngine::may_use_backup(Command command) const noexcept {
+    return use_backup_ && backup_ != nullptr && !counts_positions(command);
+}
+
+/// Adds the datagram of a channel to a frame. Returns false if it has no space for it.
+bool WireEngine::add_datagram(AcyclicFrame& frame, FrameWriter& writer, std::uint8_t index,
+                              Channel& channel) noexcept {
+    const std::size_t length = channel.length();
+    if (length > writer.space() || writer.space() == 0) return false;
+    std::uint8_t* const data =
+        writer.add(channel.command(), index, channel.address(), channel.length());
+    if (data == nullptr) return false;
+    if (!only_reads(channel.command())) {
+        std::memcpy(data, channel.data(), length);
+    }
+    const bool counts_slaves = channel.command() == Command::brd &&
+                               channel.address() == at_position(0, registers::al_status);
+    if (counts_slaves) {
+        primary_wkc_ = -1;
+    }
+    channel.set_sent(now_ns_);
+    const auto offset = static_cast<std::uint16_t>(data - frame.bytes.data());
+    frame.items[frame.count++] = {&channel, channel.generation(), offset, channel.length()};
     return true;
 }
 

@@ -120,7 +120,13 @@ private:
     void expire() noexcept;
     void expire(Flight&) noexcept;
     void wake() noexcept;
+    /// Sends the frames of the process data that are due. Returns their bytes on the wire.
+    std::size_t send_process_data(bool all_domains, std::uint64_t dc_time_ns) noexcept;
     void send_acyclic(unsigned frames, std::size_t bytes) noexcept;
+    /// Keeps a sent frame until its copies arrive or expire.
+    void track(int index, const Flight& flight) noexcept;
+    bool may_use_backup(Command command) const noexcept;
+    bool add_datagram(AcyclicFrame&, FrameWriter&, std::uint8_t index, Channel&) noexcept;
     bool pack(AcyclicFrame&, std::uint8_t index, bool& backup, std::size_t max,
               bool first) noexcept;
     std::uint8_t send(std::span<const std::uint8_t> frame, bool backup) noexcept;
