@@ -115,39 +115,21 @@ public:
         if (applicant_ && applicant_->cycle()) {
             use_schedule(*applicant_->accepted());
         }
-        const bool fits = is_cycle(cycle);
-        if (!fits && !period_reported_) {
-            period_reported_ = true;
-            on_event(Event::wrong_period, {}, cycle.period_ns());
-        }
+        check_period(cycle);
         const hal::bus::Turn turn = receive_turn(cycle);
-        if (turn == hal::bus::Turn::leaves || turn == hal::bus::Turn::returns) {
-            station_->restart();  // it listens before it sends
+        const bool changes_presence =
+            turn == hal::bus::Turn::leaves || turn == hal::bus::Turn::returns;
+        if (changes_presence) {
             end(second_master_fault_);
             pins_.fault = is_offline(turn) || fault_.lasts();
         }
+        if (changes_presence || (turn == hal::bus::Turn::restarts && is_cycle(cycle))) {
+            station_->restart();  // it listens before it sends
+        }
         if (is_offline(turn)) {
             follow(cycle.period_ns());
-            show();
-            return;
-        }
-        if (fits) {
-            if (turn == hal::bus::Turn::restarts) {
-                station_->restart();
-            }
-            if (pins_.reset && !was_reset_) {
-                station_->reset();
-                if (had_carrier_) {
-                    recover();
-                }
-            }
-            was_reset_ = pins_.reset;
-            for (std::size_t n = 0; n < others_.size(); ++n) {
-                others_[n].ask(*station_, n);
-            }
-            station_->receive(cycle.start_ns());
-            watch_second_master();
-            follow(cycle.period_ns());
+        } else if (is_cycle(cycle)) {
+            exchange(cycle);
         }
         show();
     }
@@ -237,9 +219,39 @@ private:
         }
     }
 
+    /// Returns whether the thread has the period of the schedule; the station only works then.
     bool is_cycle(hal::Cycle cycle) const noexcept {
         return !station_->setup().configured || cycle.period_ns() == station_->setup().cycle;
     }
+    /// Reports a thread of another period, once. [realtime]
+    void check_period(hal::Cycle cycle) noexcept {
+        if (is_cycle(cycle) || period_reported_) return;
+        period_reported_ = true;
+        on_event(Event::wrong_period, {}, cycle.period_ns());
+    }
+
+    /// Receives the frames of a cycle. [realtime]
+    void exchange(hal::Cycle cycle) noexcept {
+        reset_on_rising_edge();
+        for (std::size_t n = 0; n < others_.size(); ++n) {
+            others_[n].ask(*station_, n);
+        }
+        station_->receive(cycle.start_ns());
+        watch_second_master();
+        follow(cycle.period_ns());
+    }
+
+    /// Resets the station when the pin `reset` becomes TRUE. [realtime]
+    void reset_on_rising_edge() noexcept {
+        const bool rises = pins_.reset && !was_reset_;
+        was_reset_ = pins_.reset;
+        if (!rises) return;
+        station_->reset();
+        if (had_carrier_) {
+            recover();
+        }
+    }
+
     Companion* companion() const noexcept {
         if (service_) return static_cast<Companion*>(&service_->server());
         if (applicant_) return &applicant_->client();
