@@ -303,76 +303,102 @@ std::string unfinished_part(const std::string& path) {
         part);
 }
 
-}  // namespace
-
-int run_exact_replay(const ReplayOptions& options) {
-    if (!has_only_journals(options.words)) {
-        return fail(options, "--exact takes one journal and no netlist: the journal has the edits");
-    }
+/// What the options ask for.
+struct ReplayPlan {
     JournalPosition until;
-    if (!options.until.empty() && !until.parse(options.until)) {
-        return fail(options,
-                    fmt::format("--until: invalid cycle or time '{}'; write 12000, 3.5s or 250ms",
-                                options.until));
-    }
     ValueCondition condition;
-    if (!options.break_condition.empty() && !condition.parse(options.break_condition)) {
-        return fail(options, fmt::format("--break: invalid condition '{}'; {}",
-                                         options.break_condition, ValueCondition::form));
-    }
-    if (const std::string problem = panel_problem(options); !problem.empty()) {
-        return fail(options, problem);
-    }
-    if (const std::string problem = record_problem(options); !problem.empty()) {
-        return fail(options, problem);
-    }
     WhatIf change;
-    if (const std::string problem = change.parse(options); !problem.empty()) {
-        return fail(options, problem);
-    }
-    if (!options.as_test.empty() && (!change.empty() || options.shell)) {
-        return fail(options,
-                    "--as-test is for the journal as it is: without --edit, --netlist and --shell");
-    }
-    if (!options.cut.empty()) {
-        if (const std::string problem = cut_problem(options); !problem.empty()) {
-            return fail(options, "--cut: " + problem);
+
+    /// Parses the options. Returns why they are invalid, or "".
+    std::string parse(const ReplayOptions& options) {
+        if (!has_only_journals(options.words)) {
+            return "--exact takes one journal and no netlist: the journal has the edits";
         }
+        if (!options.until.empty() && !until.parse(options.until)) {
+            return fmt::format("--until: invalid cycle or time '{}'; write 12000, 3.5s or 250ms",
+                               options.until);
+        }
+        if (!options.break_condition.empty() && !condition.parse(options.break_condition)) {
+            return fmt::format("--break: invalid condition '{}'; {}", options.break_condition,
+                               ValueCondition::form);
+        }
+        if (std::string problem = panel_problem(options); !problem.empty()) return problem;
+        if (std::string problem = record_problem(options); !problem.empty()) return problem;
+        if (std::string problem = change.parse(options); !problem.empty()) return problem;
+        return output_problem(options);
     }
-    if (!options.as_test.empty() && is_occupied(options.as_test)) {
-        return fail(options, fmt::format("--as-test: '{}' exists already; name another folder, or "
-                                         "remove it",
-                                         options.as_test));
+
+private:
+    /// Returns why the journal cannot be written as a test or be cut, or "".
+    std::string output_problem(const ReplayOptions& options) const {
+        const bool is_as_test = !options.as_test.empty();
+        if (is_as_test && (!change.empty() || options.shell)) {
+            return "--as-test is for the journal as it is: without --edit, --netlist and --shell";
+        }
+        if (!options.cut.empty()) {
+            const std::string problem = cut_problem(options);
+            if (!problem.empty()) return "--cut: " + problem;
+        }
+        if (is_as_test && is_occupied(options.as_test)) {
+            return fmt::format(
+                "--as-test: '{}' exists already; name another folder, or "
+                "remove it",
+                options.as_test);
+        }
+        return "";
     }
-    JournalFile file;
-    const bool is_one = options.words.size() == 1;
-    if (!(is_one ? file.open(options.words[0]) : file.open(options.words))) {
-        return fail(options, fmt::format("cannot execute '{}': {}{}", options.words[0],
-                                         file.problem(), unfinished_part(options.words[0])));
+};
+
+/// Opens the journal, or the parts of a ring, and prints the notes about it. Returns false after
+/// printing the reason.
+bool open_journal(const ReplayOptions& options, JournalFile& file) {
+    const bool is_one_file = options.words.size() == 1;
+    const bool is_open = is_one_file ? file.open(options.words[0]) : file.open(options.words);
+    if (!is_open) {
+        fail(options, fmt::format("cannot execute '{}': {}{}", options.words[0], file.problem(),
+                                  unfinished_part(options.words[0])));
+        return false;
     }
     for (const std::string& text : file.notes()) {
         note(options, text);
     }
+    return true;
+}
+
+/// Executes the journal to its end and prints the result. Returns the exit status.
+int execute_journal(const ReplayOptions& options, JournalFile& file, const ReplayPlan& plan) {
+    std::optional<ValueDifference> difference;
+    int status = 0;
+    {
+        ExactReplay replay(options, file, plan.until, plan.condition, plan.change);
+        status = replay.run();
+        difference = replay.difference();
+    }  // the machine is gone: inputs_of() executes the journal on another one
+    if (difference && !print(inputs_of(options, *difference))) return 1;
+    return status;
+}
+
+}  // namespace
+
+int run_exact_replay(const ReplayOptions& options) {
+    ReplayPlan plan;
+    if (const std::string problem = plan.parse(options); !problem.empty()) {
+        return fail(options, problem);
+    }
+    JournalFile file;
+    if (!open_journal(options, file)) return 1;
     const JournaledProgram program(options, file);
     if (const int status = program.check(); status != 0) return status;
     program.name_readers();
     if (options.panel) {
         program.name_uncopied();
-        return run_replay_panel(options, file, change);
+        return run_replay_panel(options, file, plan.change);
     }
     if (options.shell) {
         program.name_uncopied();
-        return run_replay_shell(options, file, change);
+        return run_replay_shell(options, file, plan.change);
     }
-    std::optional<ValueDifference> difference;
-    int status = 0;
-    {
-        ExactReplay replay(options, file, until, condition, change);
-        status = replay.run();
-        difference = replay.difference();
-    }
-    if (difference && !print(inputs_of(options, *difference))) return 1;
-    return status;
+    return execute_journal(options, file, plan);
 }
 
 }  // namespace hal::tools
