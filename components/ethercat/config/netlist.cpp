@@ -166,20 +166,27 @@ std::string pin_line(const Entry& e, bool output, const std::string& slave) {
            e.pin_name() + "  " + object + "\n";
 }
 
-std::string netlist(const Bus& bus, const std::string& file, const std::string& segment) {
+namespace {
+
+/// Returns the axes of all slaves that process data can switch on.
+std::vector<Axis> axes_of(const Bus& bus) {
     std::vector<Axis> axes;
     for (std::size_t n = 0; n < bus.slaves.size(); ++n) {
-        for (unsigned axis = 0; axis < bus.slaves[n].cia402_axes; ++axis) {
-            if (Axis one(bus.setup.slaves[n], axis, bus.slaves[n].cia402_axes); one.complete()) {
-                axes.push_back(std::move(one));
+        const unsigned count = bus.slaves[n].cia402_axes;
+        for (unsigned number = 0; number < count; ++number) {
+            Axis axis(bus.setup.slaves[n], number, count);
+            if (axis.complete()) {
+                axes.push_back(std::move(axis));
             }
         }
     }
+    return axes;
+}
 
-    std::string text = "# The master of " + file +
-                       " and what is on its bus: a start. See docs/ethercat-configuration.md.\n\n"
-                       "loadrt threads name1=servo-thread period1=" +
-                       std::to_string(bus.setup.cycle_ns) + "\n\n";
+std::string load_lines(const Bus& bus, const std::string& file, const std::string& segment,
+                       const std::vector<Axis>& axes) {
+    std::string text =
+        "loadrt threads name1=servo-thread period1=" + std::to_string(bus.setup.cycle_ns) + "\n\n";
     if (!segment.empty()) {
         text += "loadrt ethercat_segment devices=\"" + segment + "\" link=" + bus.link + "\n";
     }
@@ -191,26 +198,28 @@ std::string netlist(const Bus& bus, const std::string& file, const std::string& 
     if (!names.empty()) {
         text += "loadrt --native cia402 names=" + names + "\n";
     }
-    text += "\n";
+    return text + "\n";
+}
 
-    std::set<std::string> linked;
-    for (const Axis& axis : axes) {
-        text += axis.lines(linked);
-    }
-    std::string others;
+/// Returns a comment with the pins of the master that are not in `linked`, for the user to link.
+std::string unlinked_lines(const Bus& bus, const std::set<std::string>& linked) {
+    std::string pins;
     for (const auto& slave : bus.setup.slaves) {
+        const std::string prefix = "ethercat.0." + slave.name;
         for_each_pin(slave, [&](bool output, const Entry& e) {
-            if (linked.count("ethercat.0." + slave.name + "." + e.pin_name()) == 0) {
-                others += "#   " + pin_line(e, output, "ethercat.0." + slave.name);
+            if (!linked.contains(prefix + "." + e.pin_name())) {
+                pins += "#   " + pin_line(e, output, prefix);
             }
         });
     }
-    if (!others.empty()) {
-        text += "# Pins that are not linked yet. in: written by the netlist, out: read by it\n" +
-                others + "\n";
-    }
+    if (pins.empty()) return "";
+    return "# Pins that are not linked yet. in: written by the netlist, out: read by it\n" + pins +
+           "\n";
+}
 
-    text += "addf ethercat.0.receive servo-thread\n";
+/// Returns the functions in the order of a cycle: inputs, axes, the machine, axes, outputs.
+std::string thread_lines(const std::string& segment, const std::vector<Axis>& axes) {
+    std::string text = "addf ethercat.0.receive servo-thread\n";
     for (const Axis& axis : axes) {
         text += "addf " + axis.name() + ".read-all servo-thread\n";
     }
@@ -222,6 +231,22 @@ std::string netlist(const Bus& bus, const std::string& file, const std::string& 
     if (!segment.empty()) {
         text += "addf ethercat-segment.0.update servo-thread\n";
     }
+    return text;
+}
+
+}  // namespace
+
+std::string netlist(const Bus& bus, const std::string& file, const std::string& segment) {
+    const std::vector<Axis> axes = axes_of(bus);
+    std::string text = "# The master of " + file +
+                       " and what is on its bus: a start. See docs/ethercat-configuration.md.\n\n";
+    text += load_lines(bus, file, segment, axes);
+    std::set<std::string> linked;
+    for (const Axis& axis : axes) {
+        text += axis.lines(linked);
+    }
+    text += unlinked_lines(bus, linked);
+    text += thread_lines(segment, axes);
     return text + "\nstart\n";
 }
 
