@@ -144,40 +144,52 @@ bool EthercatWire::read_registers() {
 
 bool EthercatWire::open(const EthercatOptions& options, bool alone) {
     if (!access_.open(options, alone)) return false;
-    WireDatagram count{Command::brd, ethercat::at_position(0, reg::type), {0}};
-    exchange_.run({&count, 1});
-    if (count.working_counter.value_or(0) == 0) {
+    const std::uint16_t slaves = count_slaves();
+    if (slaves == 0) {
         fail(options, fmt::format("no slave responds on {}; check cable and supply, and "
                                   "that it is the right interface",
                                   address()));
-
         return false;
     }
-    // the receive times of this frame, for the delays
-    WireDatagram latch{Command::bwr, ethercat::at_position(0, reg::dc_receive_time), {0, 0, 0, 0}};
-    exchange_.run({&latch, 1});
-    slaves_.assign(*count.working_counter, {});
+    latch_receive_times();
+    slaves_.assign(slaves, {});
     contents_.assign(size(), std::nullopt);
     if (!read_registers()) {
         const auto missing =
-            std::find_if(slaves_.begin(), slaves_.end(), [](const auto& s) { return !s.present; });
+            std::ranges::find_if(slaves_, [](const auto& s) { return !s.present; });
         fail(options, fmt::format("{} slaves respond on {}, but slave {} stopped doing "
                                   "so; check its cable and supply",
                                   size(), address(), missing->number));
-
         return false;
     }
+    measure_line();
+    return true;
+}
+
+/// Returns how many slaves a broadcast passes.
+std::uint16_t EthercatWire::count_slaves() {
+    WireDatagram count{Command::brd, ethercat::at_position(0, reg::type), {0}};
+    exchange_.run({&count, 1});
+    return count.working_counter.value_or(0);
+}
+
+/// Lets each slave latch at each port when this frame passes: the delays are computed from that.
+void EthercatWire::latch_receive_times() {
+    WireDatagram latch{Command::bwr, ethercat::at_position(0, reg::dc_receive_time), {0, 0, 0, 0}};
+    exchange_.run({&latch, 1});
+}
+
+/// Finds the parent of each slave, and its delay from the first one with distributed clocks.
+void EthercatWire::measure_line() {
     std::vector<ethercat::master::BusSlave*> line;
-    for (auto& s : slaves_) {
-        line.push_back(&s);
+    for (auto& slave : slaves_) {
+        line.push_back(&slave);
     }
     ethercat::master::find_tree(line);
-    const auto first =
-        std::find_if(line.begin(), line.end(), [](const auto* s) { return s->has_dc(); });
+    const auto first = std::ranges::find_if(line, [](const auto* s) { return s->has_dc(); });
     if (first != line.end()) {
         ethercat::master::find_delays(line, static_cast<std::size_t>(first - line.begin()));
     }
-    return true;
 }
 
 ethercat::master::BusSlave* EthercatWire::chosen(const EthercatPositionOptions& options) {

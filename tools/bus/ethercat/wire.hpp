@@ -59,7 +59,10 @@ public:
     void pass(std::int64_t ns) { access_.pass(ns); }
 
 private:
+    std::uint16_t count_slaves();
+    void latch_receive_times();
     bool read_registers();
+    void measure_line();
     void keep(std::size_t position, const SiiReader::Image& image);
 
     EthercatAccess access_;
