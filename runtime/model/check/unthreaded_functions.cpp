@@ -36,36 +36,49 @@ const LoadedFunction* waiting_for(const LoadedFunction& function) {
     return nullptr;
 }
 
+/// Returns whether a thread that called the function would change the value of a signal.
+bool has_linked_pin(const LoadedFunction& function) {
+    const auto belongs_to_function = [&](const auto& pin) {
+        return !pin->function || pin->function == &function;
+    };
+    for (const Instance* instance : function.instances) {
+        if (instance->own_threads) continue;
+        for (const auto& pin : instance->pins) {
+            if (pin->signal && belongs_to_function(pin)) return true;
+        }
+    }
+    return false;
+}
+
+void warn(const LoadedFunction& function, const std::string& sentence, const std::string& thread,
+          Diagnostics& diagnostics) {
+    diagnostics.warning("unthreaded-function", function.instances.front()->loaded,
+                        "function '" + function.name + "' is in no thread, " + sentence, "",
+                        "addf " + function.name + " " + thread);
+}
+
+void check_function(const LoadedFunction& function, const Model& model, Diagnostics& diagnostics) {
+    if (function.thread || runs_by_another(function)) return;
+    if (const LoadedFunction* const other = waiting_for(function)) {
+        return warn(function,
+                    "but '" + other->name + "' is in thread '" + other->thread->name +
+                        "' and does not work without it",
+                    other->thread->name, diagnostics);
+    }
+    if (!has_linked_pin(function)) return;
+    const std::string thread = model.threads.empty() ? "THREAD" : model.threads.back()->name;
+    warn(function, "so its linked pins never change", thread, diagnostics);
+}
+
 }  // namespace
 
 void check_unthreaded_functions(const Model& model, Unthreaded which, Diagnostics& diagnostics) {
     for (const auto& component : model.components) {
         for (const auto& function : component->functions) {
-            if (which == Unthreaded::removed && !function->was_in_thread) continue;
-            if (function->thread || runs_by_another(*function)) continue;
-            if (const LoadedFunction* const other = waiting_for(*function)) {
-                diagnostics.warning("unthreaded-function", function->instances.front()->loaded,
-                                    "function '" + function->name + "' is in no thread, but '" +
-                                        other->name + "' is in thread '" + other->thread->name +
-                                        "' and does not work without it",
-                                    "", "addf " + function->name + " " + other->thread->name);
-                continue;
+            const bool is_selected = which != Unthreaded::removed || function->was_in_thread;
+            if (is_selected) {
+                check_function(*function, model, diagnostics);
             }
-            const bool linked = std::any_of(function->instances.begin(), function->instances.end(),
-                                            [&](const Instance* instance) {
-                return !instance->own_threads &&
-                       std::any_of(instance->pins.begin(), instance->pins.end(),
-                                   [&](const auto& pin) {
-                    return pin->signal && (!pin->function || pin->function == function.get());
-                });
-            });
-            if (!linked) continue;
-            const std::string thread =
-                model.threads.empty() ? "THREAD" : model.threads.back()->name;
-            diagnostics.warning("unthreaded-function", function->instances.front()->loaded,
-                                "function '" + function->name +
-                                    "' is in no thread, so its linked pins never change",
-                                "", "addf " + function->name + " " + thread);
         }
     }
 }
