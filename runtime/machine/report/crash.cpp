@@ -107,37 +107,53 @@ bool mask_float_exceptions([[maybe_unused]] const siginfo_t& info,
 #endif
 }
 
+/// Prints " crashed (Segmentation fault)".
+void print_crashed(int signal) noexcept {
+    print(" crashed (");
+    print(signal_text(signal));
+    print(")");
+}
+
+/// Prints what was executed by this thread, and the signal that ended it.
+void print_place_of_crash(int signal) noexcept {
+    const Core* const core = Core::current();
+    if (core && core->in_function()) {
+        name_function(core, core->current_function());
+        print_crashed(signal);
+        print(" at cycle ");
+        print(core->cycle_number());
+        return;
+    }
+    if (const char* const module = module_of_task()) {
+        print(module);
+        print(": a task of the module's own");
+        return print_crashed(signal);
+    }
+    print("the program crashed outside of the cycle (");
+    print(signal_text(signal));
+    print(")");
+}
+
+/// Makes outputs safe, prints one line and ends the process by the signal. raise() ends it because
+/// SA_RESETHAND has put the default action back. [any], async-signal-safe
 void on_signal(int signal, siginfo_t* info, void* context) {
     if (signal == SIGFPE && mask_float_exceptions(*info, context)) return;
     if (in_process_copy) {
         raise(signal);
         return;
     }
-    if (reported.exchange(true)) {  // by the terminate handler, or a crash while making safe
+    // true: by the terminate handler, or this is a crash while outputs are made safe
+    const bool is_reported = reported.exchange(true);
+    if (is_reported) {
         raise(signal);
         return;
     }
     ExitObserver::silence();
     make_all_safe();
     print("hal: ");
-    if (const Core* const core = Core::current(); core && core->in_function()) {
-        name_function(core, core->current_function());
-        print(" crashed (");
-        print(signal_text(signal));
-        print(") at cycle ");
-        print(core->cycle_number());
-    } else if (const char* const module = module_of_task()) {
-        print(module);
-        print(": a task of the module's own crashed (");
-        print(signal_text(signal));
-        print(")");
-    } else {
-        print("the program crashed outside of the cycle (");
-        print(signal_text(signal));
-        print(")");
-    }
+    print_place_of_crash(signal);
     print("; outputs were set to their safe values; the process ends\n");
-    raise(signal);  // SA_RESETHAND put the default action back
+    raise(signal);
 }
 
 void install_crash_handler(int signal) noexcept {
