@@ -11,8 +11,8 @@ namespace {
 
 // The polynomial of the least squares fit is sum_k <y, p_k> p_k for an orthonormal basis p_k on the
 // points t = -age / (window - 1) (A. Savitzky, M. Golay, *Smoothing and Differentiation of Data by
-// Simplified Least Squares Procedures*, 1964). Its derivative d at t = 0 is d! times the coefficient
-// of t^d, so the weight of the sample y_i in it is d! sum_k c_kd p_k(t_i).
+// Simplified Least Squares Procedures*, 1964). Its derivative d at t = 0 is d! times the
+// coefficient of t^d, so the weight of the sample y_i in it is d! sum_k c_kd p_k(t_i).
 
 struct Polynomial {
     std::vector<double> values;  ///< on the points, by age

@@ -21,8 +21,8 @@ constexpr int typed_in_part = max_edits + 2;  // ranks below any mistyped name
 /// name to a candidate, whose characters are appended one after the other: candidates with a common
 /// beginning share the rows of it. All texts are folded.
 ///
-/// Row i is that of the first i characters of the candidate, column j that of the first j characters
-/// of the name (Levenshtein, with the swap of Damerau). Only the diagonal band that can stay within
+/// Row i is that of the first i characters of the candidate, column j that of the first j
+/// characters of the name (Levenshtein, with the swap of Damerau). Only the diagonal band that can stay within
 /// the limit is stored, so the time is linear in the length: cell d of row i is column
 /// i + d - 1 - limit, with a border on both sides.
 class EditTable {
@@ -190,8 +190,8 @@ void NameIndex::sort(const std::stop_token& stop) const {
     }
 }
 
-// Sorted names share beginnings, whose rows of the table are computed once; and where a beginning is
-// already too different, so are all names that have it.
+// Sorted names share beginnings, whose rows of the table are computed once; and where a beginning
+// is already too different, so are all names that have it.
 std::vector<NameIndex::Found> NameIndex::within(std::string_view name, int limit,
                                                 std::uint32_t before,
                                                 const std::stop_token& stop) const {

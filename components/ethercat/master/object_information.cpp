@@ -48,8 +48,8 @@ public:
     FragmentBuffer(std::span<std::uint8_t> head, std::span<std::uint8_t> rest)
         : head_(head), rest_(rest) {}
 
-    /// Appends the data of a fragment. Returns false if the first one is shorter than the head. What
-    /// does not fit is dropped, so that the mailbox is read to the end.
+    /// Appends the data of a fragment. Returns false if the first one is shorter than the head.
+    /// What does not fit is dropped, so that the mailbox is read to the end.
     bool append(std::span<const std::uint8_t> data) noexcept {
         if (!has_head_) {
             if (data.size() < head_.size()) return false;
@@ -77,8 +77,8 @@ private:
 
 }  // namespace
 
-// `key` is what the request asks for, as `key_bytes` bytes: a list, or an index and a sub-index. The
-// first fragment repeats it.
+// `key` is what the request asks for, as `key_bytes` bytes: a list, or an index and a sub-index.
+// The first fragment repeats it.
 Task<MailboxResult> ObjectInformation::fetch(Channel& channel, BusSlave& slave,
                                              coe::Information request, std::uint32_t key,
                                              std::size_t key_bytes, std::span<std::uint8_t> head,
