@@ -133,7 +133,7 @@ public:
         return true;
     }
     /// Without a description: tries the PDOs of each axis in the order of their numbers, until as
-    /// many are missing one after the other as suffices to say that there are no more. Returns
+    /// many are missing one after the other that there are certainly no more. Returns
     /// false after printing why the node does not respond.
     bool probe(bool received) {
         for (unsigned offset = 0; offset < max_pdos; offset += pdos_per_axis) {
