@@ -54,7 +54,7 @@ Description commanding() {
     return d;
 }
 
-struct Arrivals : Events {
+struct Arrivals : DeviceEvents {
     std::uint64_t count = 0;
     void on_rpdo(unsigned, Time) noexcept override { ++count; }
 };
@@ -108,7 +108,7 @@ private:
 };
 
 [[noreturn]] void slave(const char* address) {
-    Events events;
+    DeviceEvents events;
     Device device(served(), {.node_id = node, .auto_start = true, .sdo = {.timeout = 5 * second}},
                   events);
     Port port(address, {{0x080, 0x7ff, false},
@@ -239,7 +239,7 @@ void receive(const char* address, std::uint64_t count) {
 /// Client and server in one thread: what the protocol costs with queues for a bus, and what it
 /// costs with the bus in memory between them.
 void memory(unsigned part, bool on_bus) {
-    Events events;
+    DeviceEvents events;
     Device device(served(), {.node_id = node}, events);
     FrameQueue out(1024);
     Network network(out, events, {.timeout = 2 * second});

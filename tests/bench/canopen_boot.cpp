@@ -87,7 +87,7 @@ public:
 
 private:
     std::unique_ptr<can::Link> link_;
-    Events events_;
+    DeviceEvents events_;
     std::vector<std::unique_ptr<Device>> devices_;
 };
 

@@ -48,14 +48,14 @@ std::string configuration(int count, const std::string& link, const std::string&
 }
 
 struct NoEvents final : master::Events {
-    void report(master::Event, std::uint32_t, std::int64_t, std::int64_t) noexcept override {}
+    void on_event(master::Event, std::uint32_t, std::int64_t, std::int64_t) noexcept override {}
 };
 
 /// A master as the component makes it, in the hands of one thread.
 class OurMaster {
 public:
     OurMaster(const std::string& interface, int drives) {
-        const config::Reading reading =
+        const config::ReadResult reading =
             config::read(configuration(drives, "eth:" + interface, "1ms"), "bench.ethercat");
         if (!reading.good()) throw std::runtime_error(config::to_string(reading, "bench.ethercat"));
         ethernet::Options options;
@@ -203,15 +203,15 @@ void cycles(const Options& options, Report& report, const std::string& here,
                 share(floor[0].wall, 0.5), at_most(1.15)});
     report.row({"  CPU, p50", "us", share(ours[0].cpu, 0.5), raw, share(floor[0].cpu, 0.5),
                 at_most(1.25)});
-    report.row({"  p99", "us", share(ours[0].wall, 0.99), raw, share(floor[0].wall, 0.99),
-                at_most(1.3)});
+    report.row(
+        {"  p99", "us", share(ours[0].wall, 0.99), raw, share(floor[0].wall, 0.99), at_most(1.3)});
     report.row(
         {"  back to back beside SOEM, p50", "us", share(ours[0].wall, 0.5), by, peer.wall, {}});
     report.row({"  CPU beside SOEM, p50", "us", share(ours[0].cpu, 0.5), by, peer.cpu, {}});
     report.row({"50 drives, a cycle in each millisecond, p50", "us", share(ours[1].wall, 0.5), raw,
                 share(floor[1].wall, 0.5), at_most(1.15)});
-    report.row({"  p99", "us", share(ours[1].wall, 0.99), raw, share(floor[1].wall, 0.99),
-                at_most(1.2)});
+    report.row(
+        {"  p99", "us", share(ours[1].wall, 0.99), raw, share(floor[1].wall, 0.99), at_most(1.2)});
     report.row({"  beside SOEM, p50", "us", share(ours[1].wall, 0.5), by, peer.paced, {}});
     report.row({"50 drives, scan to OP with mapping and clocks", "ms", median(starts), by,
                 peer.start_ms, at_most(0.6)});

@@ -22,7 +22,7 @@ using namespace hal::scocan;
 constexpr Time us = 1000;
 constexpr Time ms = 1'000'000;
 
-struct Nothing final : Sink {
+struct Nothing final : Events {
     void on_frame(const can::Frame&, Time) noexcept override {}
     void on_event(Event, std::uint32_t, std::uint32_t, Time) noexcept override {}
 };

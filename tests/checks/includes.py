@@ -207,15 +207,15 @@ ROWS = {
         "drivers/link",
     ],
     "components/fieldbus/guardian/plugins": ["components/fieldbus/guardian", "runtime/sdk"],
-    "components/fieldbus/scocan/table": [
+    "components/fieldbus/scocan/config": [
         "runtime/text",
         "drivers/link",
         "components/bus/config",
     ],
-    "components/fieldbus/scocan/wire": ["components/fieldbus/scocan/table"],
+    "components/fieldbus/scocan/wire": ["components/fieldbus/scocan/config"],
     "components/fieldbus/scocan/station": ["components/fieldbus/scocan/wire"],
     "components/fieldbus/scocan/plan": [
-        "components/fieldbus/scocan/table",
+        "components/fieldbus/scocan/config",
         "components/fieldbus/can_timing",
     ],
     "components/fieldbus/scocan/plugins": [

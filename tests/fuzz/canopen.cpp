@@ -50,7 +50,7 @@ Description description() {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     static const Description plan = description();
-    Events events;
+    DeviceEvents events;
     Device device(plan, {.node_id = 5, .queue = 64, .sdo = {.tolerate_repeats = size % 2 == 0}},
                   events);
     FrameQueue out(64);

@@ -41,7 +41,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         bytes = description;
         return true;
     };
-    const config::Reading reading = config::read(text, "folder/net.canopen", file);
+    const config::ReadResult reading = config::read(text, "folder/net.canopen", file);
     for (const config::Message& m : reading.messages) {
         require(m.at.offset + std::size_t{m.at.length} <= size, "a place lies in the text");
         require(!m.sentence.empty(), "a message is not empty");

@@ -17,7 +17,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         require(bytes.size() == size && std::equal(bytes.begin(), bytes.end(), data),
                 "a concise DCF is what it is made of");
     }
-    const Reading reading = read_description({reinterpret_cast<const char*>(data), size});
+    const ReadResult reading = read_description({reinterpret_cast<const char*>(data), size});
     for (const Message& message : reading.messages) {
         require(message.at.offset + std::size_t{message.at.length} <= reading.text.size(),
                 "a place lies in the text");
@@ -37,12 +37,12 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     require(parse_concise(concise(configuration.writes)) == configuration.writes,
             "writes survive the way into bytes and back");
     const std::string once = write_eds(*reading.description);
-    const Reading again = read_eds(once);
+    const ReadResult again = read_eds(once);
     require(again.description.has_value(), "what was written is read");
     // Texts out of XML may have line breaks and blanks that a line cannot keep; after one round
     // nothing changes any more.
     const std::string twice = write_eds(*again.description);
-    const Reading third = read_eds(twice);
+    const ReadResult third = read_eds(twice);
     require(third.description && *third.description == *again.description,
             "reading and writing change nothing");
     DeviceDescription joined = *reading.description;

@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "components/ethercat/config/config.hpp"
-#include "components/ethercat/config/event_words.hpp"
+#include "components/ethercat/config/event_texts.hpp"
 #include "components/ethercat/config/plan.hpp"
 #include "components/ethercat/devices/registry.hpp"
 #include "components/ethercat/esc/line.hpp"
@@ -157,7 +157,7 @@ void configuration(std::string_view text) {
         "SubIndex><BitLen>8</BitLen>"
         "<Name>A</Name><DataType>USINT</DataType></Entry></RxPdo></Device></Devices></"
         "Descriptions></EtherCATInfo>";
-    const config::Reading reading =
+    const config::ReadResult reading =
         config::read(text, "m.ethercat", [&](const std::string&, std::string& bytes) {
         bytes = esi;
         return true;
@@ -320,9 +320,9 @@ struct DamagedPort final : hal::ethernet::Port {
 /// Forms the sentence of every event.
 struct Nobody final : master::Events {
     explicit Nobody(const master::Setup& s) : setup(s) {}
-    void report(master::Event event, std::uint32_t slave, std::int64_t first,
-                std::int64_t second) noexcept override {
-        config::event_words({event, slave, first, second}, setup, "sim:a", "");
+    void on_event(master::Event event, std::uint32_t slave, std::int64_t first,
+                  std::int64_t second) noexcept override {
+        config::event_text({event, slave, first, second}, setup, "sim:a", "");
     }
     const master::Setup& setup;
 };
@@ -333,7 +333,7 @@ void bus(std::span<const std::uint8_t> in) {
     if (in.empty()) return;
     const std::size_t length = std::min<std::size_t>(2U * in[0], in.size() - 1);
     Line line("servo\ndigital_out\n", in.subspan(1, length));
-    config::Reading reading = config::read(
+    config::ReadResult reading = config::read(
         "[bus]\nlink = sim:a\ncycle = 1ms\n[slave 0 x]\ndevice = cia402\noutputs = 6040 607A\n"
         "inputs = 6041 6064\ndc = sync0\n[slave 1 io]\noutputs = 7000:1 bit\n",
         "m.ethercat");

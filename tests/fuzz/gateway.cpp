@@ -28,7 +28,7 @@ Description description() {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     static const Description plan = description();
-    Events events;
+    DeviceEvents events;
     Device device(plan, {.node_id = 5, .queue = 256}, events);
     gateway::Gateway gateway(1);
     Time now = 0;

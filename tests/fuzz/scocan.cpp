@@ -15,7 +15,7 @@ namespace {
 using namespace hal::scocan;
 using hal::fuzz::require;
 
-struct Nothing final : Sink {
+struct Nothing final : Events {
     void on_frame(const hal::can::Frame&, Time) noexcept override {}
     void on_event(Event, std::uint32_t, std::uint32_t, Time) noexcept override {}
 };
@@ -51,7 +51,7 @@ void use(const Table& table, const std::uint8_t* data, std::size_t size) {
 }
 
 void table(std::string_view text) {
-    const Reading reading = read(text);
+    const ReadResult reading = read(text);
     for (const Report& m : reading.messages) {
         require(m.at.offset + std::size_t{m.at.length} <= text.size() + 1,
                 "a place lies in the text");
@@ -59,7 +59,7 @@ void table(std::string_view text) {
     }
     if (!reading.good()) return;
     const std::string form = normalised(reading.table);
-    const Reading again = read(form);
+    const ReadResult again = read(form);
     require(again.good() && normalised(again.table) == form,
             "the normalised form is the same table");
     require(again.table.crc == reading.table.crc, "with the same CRC");
@@ -90,7 +90,7 @@ void frame(const std::uint8_t* data, std::size_t size) {
     if (Answer a; decode(f, a)) {
         require(encode(a).same(f), "an answer too");
     }
-    static const Reading reading =
+    static const ReadResult reading =
         read("node c A sync\nnode n A\nmode 0 run\n0 sync\n1 private n 0x100\n");
     use(reading.table, data, size);
 }

@@ -118,7 +118,7 @@ void configuration(std::span<const std::uint8_t> given) {
 }
 
 void schedule(std::string_view text) {
-    const config::Reading reading = config::read(text);
+    const config::ReadResult reading = config::read(text);
     for (const config::Message& m : reading.messages) {
         require(m.at.offset + std::size_t{m.at.length} <= text.size(), "a place lies in the text");
         require(!m.sentence.empty(), "a message is not empty");

@@ -68,7 +68,7 @@ Description description() {
 
 int device(const char* address, std::uint8_t id) {
     Port port(address);
-    Events events;
+    DeviceEvents events;
     Device device(description(), {.node_id = id}, events);
     device.start(clock_now());
     for (;;) {
@@ -85,7 +85,7 @@ int device(const char* address, std::uint8_t id) {
 
 int client(const char* address, std::uint8_t id) {
     Port port(address);
-    Events events;
+    DeviceEvents events;
     FrameQueue out(1024);
     Network network(out, events, {.timeout = 1 * second});
     auto& node = network.add(id);

@@ -108,7 +108,7 @@ void rtcfg_frame(Capture& out, rtcfg::Message m, const std::string& fields) {
 }
 
 void rtcfg_frames(Capture& out) {
-    const config::Reading reading = config::read(
+    const config::ReadResult reading = config::read(
         "master:\ncycle 1000\nslot 0 50\nslave:\nname x\nip 10.0.0.2\nslot 0 300 1/2 60\nslot 3 "
         "600\n");
     const std::string block = config::block_of(reading.schedule, 1);  // as a master sends it

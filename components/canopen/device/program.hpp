@@ -13,8 +13,8 @@
 //         std::uint8_t brightness = 0;
 //     };
 //
-// A Node (node.hpp) runs it on a link. Events notifies it of SYNC, states and errors, Handler of
-// values that are read and written.
+// A Node (node.hpp) runs it on a link. DeviceEvents notifies it of SYNC, states and errors, Handler
+// of values that are read and written.
 #pragma once
 
 #include <memory>
@@ -28,7 +28,7 @@ namespace hal::canopen {
 
 /// The application of a device. All functions are called by the thread that turns the Node, except
 /// where noted.
-class Program : public Events, public Handler {
+class Program : public DeviceEvents, public Handler {
 public:
     /// Returns all objects of the device. Called once, before the device is created. [setup]
     virtual Description description() const = 0;

@@ -206,7 +206,7 @@ struct DeviceDescription {
 };
 
 /// The result of reading a file.
-struct Reading {
+struct ReadResult {
     /// nothing: the file was rejected; the last message is the reason
     std::optional<DeviceDescription> description;
     std::vector<Message> messages;  ///< in the order of the file
@@ -218,7 +218,7 @@ struct Reading {
 };
 
 /// Reads the bytes of an EDS or DCF file. [any, not real time]
-Reading read_eds(std::string_view bytes);
+ReadResult read_eds(std::string_view bytes);
 
 /// Writes an EDS, or a DCF if there is a commissioning. UTF-8; lines end with CR LF, as in CiA 306.
 std::string write_eds(const DeviceDescription& description);

@@ -347,21 +347,21 @@ private:
 
 }  // namespace
 
-std::size_t Reading::count(Severity severity) const {
+std::size_t ReadResult::count(Severity severity) const {
     return static_cast<std::size_t>(
         std::count_if(messages.begin(), messages.end(),
                       [&](const Message& m) { return m.severity == severity; }));
 }
 
-std::vector<Message> Reading::doubts() const {
+std::vector<Message> ReadResult::doubts() const {
     std::vector<Message> out;
     std::copy_if(messages.begin(), messages.end(), std::back_inserter(out),
                  [](const Message& m) { return unreliable(m.topic); });
     return out;
 }
 
-Reading read_eds(std::string_view bytes) {
-    Reading out;
+ReadResult read_eds(std::string_view bytes) {
+    ReadResult out;
     if (!decode(bytes, out.text, out.messages)) return out;
     const std::size_t of_decoding = out.messages.size();
     Ini ini;

@@ -495,8 +495,8 @@ private:
 
 #endif
 
-Reading read_xdd(std::string_view bytes) {
-    Reading out;
+ReadResult read_xdd(std::string_view bytes) {
+    ReadResult out;
     if (!decode(bytes, out.text, out.messages)) return out;
     const auto refuse = [&](std::string sentence, std::string help, Span at = {1, 1, 0, 0}) {
         out.messages.push_back(
@@ -533,7 +533,7 @@ Reading read_xdd(std::string_view bytes) {
 #endif
 }
 
-Reading read_description(std::string_view bytes) {
+ReadResult read_description(std::string_view bytes) {
     std::string_view start = trimmed(bytes.substr(0, 64));
     if (start.substr(0, 3) == "\xEF\xBB\xBF") {
         start.remove_prefix(3);

@@ -11,9 +11,9 @@ namespace hal::canopen::eds {
 
 /// Reads the bytes of an XDD or XDC file. A build without the XML library rejects them with the
 /// reason. [setup]
-Reading read_xdd(std::string_view bytes);
+ReadResult read_xdd(std::string_view bytes);
 
 /// Reads XML if the first character that is not blank is <, else an EDS or DCF. [setup]
-Reading read_description(std::string_view bytes);
+ReadResult read_description(std::string_view bytes);
 
 }  // namespace hal::canopen::eds

@@ -11,7 +11,7 @@ void RemoteNode::guard(Time period, std::uint8_t factor, Time now) noexcept {
     toggle_known_ = toggle_stuck_ = false;
 }
 
-void RemoteNode::on_error_control(const Frame& f, Time now, Events& events) noexcept {
+void RemoteNode::on_error_control(const Frame& f, Time now, DeviceEvents& events) noexcept {
     if (f.remote || f.length < 1) return;
     const auto state = static_cast<NmtState>(f.data[0] & 0x7f);
     const bool boot_up = f.data[0] == 0;
@@ -53,7 +53,7 @@ void RemoteNode::on_error_control(const Frame& f, Time now, Events& events) noex
     }
 }
 
-void RemoteNode::on_emergency(const Frame& f, Time now, Events& events) noexcept {
+void RemoteNode::on_emergency(const Frame& f, Time now, DeviceEvents& events) noexcept {
     if (f.remote || f.length < 3) return;
     const auto e = EmcyConsumer::read(f, now);
     emergencies_[emergency_count_++ % history] = e;
@@ -61,7 +61,7 @@ void RemoteNode::on_emergency(const Frame& f, Time now, Events& events) noexcept
     events.on_emergency(id_, e);
 }
 
-void RemoteNode::poll(Time now, Events& events) noexcept {
+void RemoteNode::poll(Time now, DeviceEvents& events) noexcept {
     sdo_.poll(now);
     bool silent =
         heartbeat_limit_ != 0 && guard_period_ == 0 && watching_ && now - last_ >= heartbeat_limit_;

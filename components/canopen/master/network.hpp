@@ -67,9 +67,9 @@ public:
 
 private:
     friend class Network;
-    void on_error_control(const Frame&, Time now, Events&) noexcept;
-    void on_emergency(const Frame&, Time now, Events&) noexcept;
-    void poll(Time now, Events&) noexcept;
+    void on_error_control(const Frame&, Time now, DeviceEvents&) noexcept;
+    void on_emergency(const Frame&, Time now, DeviceEvents&) noexcept;
+    void poll(Time now, DeviceEvents&) noexcept;
 
     const std::uint8_t id_;
     FrameQueue& out_;
@@ -100,7 +100,7 @@ private:
 class Network {
 public:
     /// Creates an empty network; queue and events outlive it. [setup]
-    Network(FrameQueue& out, Events& events, const SdoClientSettings& settings = {})
+    Network(FrameQueue& out, DeviceEvents& events, const SdoClientSettings& settings = {})
         : out_(out), events_(events), settings_(settings) {}
 
     /// Returns the node, creating it if necessary; id 1..127. [setup]
@@ -119,7 +119,7 @@ public:
 
 private:
     FrameQueue& out_;
-    Events& events_;
+    DeviceEvents& events_;
     const SdoClientSettings settings_;
     std::array<std::unique_ptr<RemoteNode>, 128> nodes_{};
 };

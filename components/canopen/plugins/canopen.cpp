@@ -23,7 +23,7 @@ namespace {
 
 using namespace hal::canopen;
 
-class Canopen : public hal::bus::BusComponent, private RunnerEvents {
+class Canopen : public hal::bus::BusComponent, private Events {
 public:
     explicit Canopen(const hal_host* host) : BusComponent(host, "canopen.0") {
         std::string file;
@@ -41,7 +41,7 @@ public:
                               "copies pins to objects, sends the SYNC and the PDOs of this cycle",
                               hal::FunctionOptions{.required = true});
         }
-        runner_ = std::make_unique<Runner>(config_, static_cast<RunnerEvents&>(*this));
+        runner_ = std::make_unique<Runner>(config_, static_cast<Events&>(*this));
         const hal::Function& shows = by_index() ? *update_ : *receive_;
         bus_.emplace(*this, shows);
         if (config_.flying.enabled) {
@@ -90,12 +90,12 @@ public:
         begin_cycles();
         reported_notes_.assign(nodes_.size(), 0);
         reporter_->start();
-        runner_->open(*link_);
+        runner_->attach(*link_);
         report_path_delays();
     }
 
     void stop() noexcept {
-        runner_->close();
+        runner_->detach();
         reporter_->stop();
         if (link_) {
             setup_time_.expect(link_->closing_ns(), hal::can::closing_text);
@@ -147,7 +147,7 @@ public:
             }
             return;
         }
-        record_invalid_inputs(objects_->take(*runner_));
+        record_invalid_inputs(objects_->transmit(*runner_));
         runner_->transmit(
             cycle.start_ns(), cycle.period_ns(),
             link_ && link_->leads(config_.node_id, cycle.start_ns(), cycle.period_ns()));

@@ -60,7 +60,7 @@ struct ConfigurationArguments {
     /// the exception that ends the constructor once the problems are reported. [setup]
     config::MasterConfig read(std::string& path) const {
         const hal::Texts texts(component_);
-        config::Reading reading;
+        config::ReadResult reading;
         if (by_index() && file.get().empty()) {
             reading = read_by_index(texts);
         } else if (!file.get().empty()) {
@@ -93,7 +93,7 @@ struct ConfigurationArguments {
     }
 
 private:
-    config::Reading read_by_index(const hal::Texts& texts) const {
+    config::ReadResult read_by_index(const hal::Texts& texts) const {
         auto reading = config::read(config::ByIndex{
             inputs.get(), outputs.get(), eds.get().empty() ? "" : texts.find(eds.get()),
             static_cast<unsigned>(node_id), static_cast<unsigned>(own_id)});
@@ -115,7 +115,7 @@ private:
         return reading;
     }
 
-    [[noreturn]] static void reject(const config::Reading& reading) {
+    [[noreturn]] static void reject(const config::ReadResult& reading) {
         const auto error = std::find_if(
             reading.messages.begin(), reading.messages.end(),
             [](const config::Message& m) { return m.severity == config::Severity::error; });

@@ -24,7 +24,7 @@ constexpr std::uint32_t load_defaults = 0x64616f6c;
 constexpr bool usable(std::uint8_t id) noexcept { return id >= 1 && id <= 127; }
 }  // namespace
 
-Device::Device(const Description& description, const DeviceSettings& settings, Events& events)
+Device::Device(const Description& description, const DeviceSettings& settings, DeviceEvents& events)
     : settings_(settings),
       events_(events),
       out_(settings.queue),

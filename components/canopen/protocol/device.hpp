@@ -4,7 +4,7 @@
 //
 //     Description d = basic_device({.vendor = 1, .product = 2, .heartbeat_ms = 100});
 //     d.add(0x2000, 0, Type::integer32, Access::read_write, 7, "speed").mappable();
-//     Events events;                                     // override what the application reacts to
+//     DeviceEvents events;                               // override what the application reacts to
 //     Device device(d, {.node_id = 5}, events);          // [setup]
 //     device.start(now);
 //     each cycle:
@@ -47,7 +47,7 @@ struct DeviceSettings {
 class Device final : private Handler {
 public:
     /// Builds the node; the events outlive it. [setup]
-    Device(const Description&, const DeviceSettings&, Events&);
+    Device(const Description&, const DeviceSettings&, DeviceEvents&);
 
     /// Boots the node with the present values of the dictionary and sends the boot-up message.
     /// [realtime]
@@ -111,7 +111,7 @@ private:
     void configure_channel(std::uint16_t index) noexcept;
 
     const DeviceSettings settings_;
-    Events& events_;
+    DeviceEvents& events_;
     FrameQueue out_;
     Dictionary dictionary_;
     Emcy emcy_;

@@ -141,7 +141,7 @@ void EmcyConsumer::reset() noexcept {
     }
 }
 
-bool EmcyConsumer::handle(const Frame& f, Time now, Events& events) noexcept {
+bool EmcyConsumer::handle(const Frame& f, Time now, DeviceEvents& events) noexcept {
     for (std::size_t node = 1; node <= highest_; ++node) {
         if ((cobs_[node] & cob_invalid) != 0 || cob_id(cobs_[node]) != f.id ||
             ((cobs_[node] & cob_extended) != 0) != f.extended) {

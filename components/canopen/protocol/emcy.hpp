@@ -93,7 +93,7 @@ public:
     /// Reads 1028h. [realtime]
     void reset() noexcept;
     /// Processes a frame; returns true if it is an emergency of a node in 1028h. [realtime]
-    bool handle(const Frame&, Time now, Events&) noexcept;
+    bool handle(const Frame&, Time now, DeviceEvents&) noexcept;
     void written(Entry&) noexcept override { reset(); }
     /// Decodes an EMCY frame. [any]
     static Emergency read(const Frame&, Time now) noexcept;

@@ -64,7 +64,7 @@ void ErrorControl::send_boot_up() noexcept {
     boot_pending_ = !out_.push(make_frame(0x700U + node_id_, 1));
 }
 
-bool ErrorControl::handle(const Frame& f, Time now, Events& events) noexcept {
+bool ErrorControl::handle(const Frame& f, Time now, DeviceEvents& events) noexcept {
     if (f.extended || f.id <= 0x700 || f.id >= 0x780) return false;
     const auto node = static_cast<std::uint8_t>(f.id - 0x700);
     if (f.remote) {
@@ -88,7 +88,7 @@ bool ErrorControl::handle(const Frame& f, Time now, Events& events) noexcept {
     return true;
 }
 
-void ErrorControl::answer_guarding(Time now, Events& events) noexcept {
+void ErrorControl::answer_guarding(Time now, DeviceEvents& events) noexcept {
     Frame answer = make_frame(0x700U + node_id_, 1);
     answer.data[0] = static_cast<std::uint8_t>(static_cast<std::uint8_t>(state_) | toggle_);
     if (out_.push(answer)) {
@@ -105,7 +105,7 @@ void ErrorControl::answer_guarding(Time now, Events& events) noexcept {
 }
 
 void ErrorControl::on_heartbeat(std::uint8_t node, NmtState state, Time now,
-                                Events& events) noexcept {
+                                DeviceEvents& events) noexcept {
     for (std::size_t n = 1; n <= highest_; ++n) {
         auto& c = consumers_[n];
         if (c.node != node || c.limit == 0) continue;
@@ -130,7 +130,7 @@ void ErrorControl::on_heartbeat(std::uint8_t node, NmtState state, Time now,
     }
 }
 
-ErrorControl::Change ErrorControl::poll(Time now, Events& events) noexcept {
+ErrorControl::Change ErrorControl::poll(Time now, DeviceEvents& events) noexcept {
     Change change;
     if (!booted_) return change;
     if (boot_pending_) {

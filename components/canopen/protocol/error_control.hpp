@@ -24,7 +24,7 @@ public:
     void set_state(NmtState state) noexcept { state_ = state; }
 
     /// Processes a frame; returns true if it belongs to error control. [realtime]
-    bool handle(const Frame&, Time now, Events&) noexcept;
+    bool handle(const Frame&, Time now, DeviceEvents&) noexcept;
     /// What changed in a poll().
     struct Change {
         /// the heartbeat of a consumed node or the guarding of the master timed out
@@ -33,7 +33,7 @@ public:
         bool recovered = false;  ///< no timeout is active any more
     };
     /// Sends the heartbeat when it is due and checks all timeouts. [realtime]
-    Change poll(Time now, Events&) noexcept;
+    Change poll(Time now, DeviceEvents&) noexcept;
 
     /// Returns true if no node of 1016h and no life guarding has timed out. Nodes never received do
     /// not count as lost. [realtime]
@@ -56,8 +56,8 @@ private:
     void read_consumer(const Entry&) noexcept;
     void read_producer() noexcept;
     void send_boot_up() noexcept;
-    void answer_guarding(Time now, Events&) noexcept;
-    void on_heartbeat(std::uint8_t node, NmtState, Time now, Events&) noexcept;
+    void answer_guarding(Time now, DeviceEvents&) noexcept;
+    void on_heartbeat(std::uint8_t node, NmtState, Time now, DeviceEvents&) noexcept;
 
     Dictionary& dictionary_;
     FrameQueue& out_;

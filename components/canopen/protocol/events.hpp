@@ -32,9 +32,9 @@ enum class NodeEvent : std::uint8_t {
 };
 
 /// All calls come from poll() or handle(). [realtime]
-class Events {
+class DeviceEvents {
 public:
-    virtual ~Events() = default;
+    virtual ~DeviceEvents() = default;
     /// The NMT state of this node changed.
     virtual void on_state(NmtState) noexcept {}
     /// An NMT reset was executed; objects have their power-on values. `application`: reset node,

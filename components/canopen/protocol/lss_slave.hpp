@@ -12,7 +12,7 @@ namespace hal::canopen {
 class LssSlave {
 public:
     /// Creates the slave; both arguments outlive it. [setup]
-    LssSlave(FrameQueue& out, Events& events) noexcept : out_(out), events_(events) {}
+    LssSlave(FrameQueue& out, DeviceEvents& events) noexcept : out_(out), events_(events) {}
     /// Sets identity (1018h) and active node ID. [realtime]
     void configure(const Identity& identity, std::uint8_t node_id) noexcept {
         identity_ = identity;
@@ -54,7 +54,7 @@ private:
     void handle_configuration(const Frame&) noexcept;
 
     FrameQueue& out_;
-    Events& events_;
+    DeviceEvents& events_;
     Identity identity_{};
     std::uint8_t active_id_ = unconfigured;
     std::uint8_t pending_id_ = unconfigured;

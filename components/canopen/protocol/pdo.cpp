@@ -36,7 +36,7 @@ struct Parameter {
 bool is_multiplexable(const Entry* e) noexcept { return e != nullptr && e->tpdo && e->size <= 4; }
 }  // namespace
 
-Pdos::Pdos(Dictionary& dictionary, FrameQueue& out, Emcy& emcy, Events& events,
+Pdos::Pdos(Dictionary& dictionary, FrameQueue& out, Emcy& emcy, DeviceEvents& events,
            const PdoSettings& settings)
     : dictionary_(dictionary), out_(out), emcy_(emcy), events_(events), settings_(settings) {
     rpdo_of_.fill(-1);

@@ -38,7 +38,7 @@ public:
     static constexpr unsigned max_pdos = 512;  ///< RPDOs, and as many TPDOs
 
     /// Creates the PDOs that the dictionary describes; all arguments outlive them. [setup]
-    Pdos(Dictionary&, FrameQueue& out, Emcy&, Events&, const PdoSettings& = {});
+    Pdos(Dictionary&, FrameQueue& out, Emcy&, DeviceEvents&, const PdoSettings& = {});
     /// Reads all parameters after a communication reset. [realtime]
     void reset(std::uint8_t node_id) noexcept;
     /// Starts or stops the exchange of PDOs; they exist only in the NMT state operational.
@@ -197,7 +197,7 @@ private:
     Dictionary& dictionary_;
     FrameQueue& out_;
     Emcy& emcy_;
-    Events& events_;
+    DeviceEvents& events_;
     const PdoSettings settings_;
     std::uint8_t node_id_ = 0;
     bool operational_ = false;

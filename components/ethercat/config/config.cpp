@@ -125,7 +125,7 @@ public:
         out_.buses.resize(1);
     }
 
-    Reading read() {
+    ReadResult read() {
         Section* const bus = sections_.one("bus");
         if (bus == nullptr) {
             report_.error(Topic::line, {1, 1, 0, 0}, "missing section [bus]",
@@ -267,7 +267,7 @@ private:
     Descriptions descriptions_;
     const Line* reference_ = nullptr;
     bool default_given_ = false;
-    Reading out_;
+    ReadResult out_;
 };
 
 }  // namespace
@@ -426,14 +426,14 @@ bool read_from_disk(const std::string& path, std::string& bytes) {
     return read_regular_file(path, 64'000'000, bytes);
 }
 
-Reading read(std::string_view text, const std::string& path, const ReadFile& read_file,
-             const IsAssumed& is_assumed) {
+ReadResult read(std::string_view text, const std::string& path, const ReadFile& read_file,
+                const IsAssumed& is_assumed) {
     return trimmed(text).starts_with('<') || trimmed(text).starts_with("\xef\xbb\xbf<")
                ? read_lcec(text, path, read_file, is_assumed)
                : ConfigFile(text, path, read_file).read();
 }
 
-std::string to_string(const Reading& reading, const std::string& path) {
+std::string to_string(const ReadResult& reading, const std::string& path) {
     return text::errors_text(reading.messages, path);
 }
 

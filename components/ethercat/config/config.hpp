@@ -2,7 +2,7 @@
 // The configuration of an EtherCAT bus: a `.ethercat` file, or LinuxCNC's ethercat-conf.xml.
 // docs/ethercat-configuration.md is the reference.
 //
-//     config::Reading reading = config::read(text, "machine.ethercat");
+//     config::ReadResult reading = config::read(text, "machine.ethercat");
 //     if (!reading.good()) print(config::to_string(reading, "machine.ethercat"));
 //     for (const config::Bus& bus : reading.buses) start(bus.link, bus.setup);
 //
@@ -114,7 +114,7 @@ struct Bus {
     Span at{};
 };
 
-struct Reading {
+struct ReadResult {
     std::vector<Bus> buses;  ///< one for a `.ethercat` file
     bool lcec = false;  ///< LinuxCNC's format: pins are named lcec.MASTER.SLAVE.PIN
     std::vector<Message> messages;  ///< in order of place
@@ -131,8 +131,8 @@ using IsAssumed = std::function<bool(const std::string& slave)>;
 /// Reads a configuration of either format: XML if its first character is `<`. Relative paths in it
 /// start at the folder of `path`. A slave of an unknown type of lcec is an error, unless its pins
 /// are assumed to exist; it then has none.
-Reading read(std::string_view text, const std::string& path, const ReadFile& = read_from_disk,
-             const IsAssumed& = {});
+ReadResult read(std::string_view text, const std::string& path, const ReadFile& = read_from_disk,
+                const IsAssumed& = {});
 
 /// Return the keys of [bus], of a slave, of its clocks and of its objects, as tables in Markdown.
 std::string bus_reference();
@@ -146,7 +146,7 @@ std::string object_reference();
 bool read_gateway(std::string_view text, Bus&);
 
 /// Formats each error as "file:12:7: error: sentence; help", for hosts without a renderer.
-std::string to_string(const Reading&, const std::string& path);
+std::string to_string(const ReadResult&, const std::string& path);
 
 /// A slave as found on a bus or described in an ESI, for write().
 struct Found {

@@ -97,6 +97,7 @@ private:
 void check_bus(const Bus&, Report&);
 
 /// Reads LinuxCNC's format.
-Reading read_lcec(std::string_view xml, const std::string& path, const ReadFile&, const IsAssumed&);
+ReadResult read_lcec(std::string_view xml, const std::string& path, const ReadFile&,
+                     const IsAssumed&);
 
 }  // namespace hal::ethercat::config

@@ -28,7 +28,7 @@ public:
           read_file_(read_file),
           is_assumed_(is_assumed) {}
 
-    Reading read() {
+    ReadResult read() {
         out_.lcec = true;
         pugi::xml_document document;
         const auto result = document.load_buffer(text_.data(), text_.size());
@@ -63,7 +63,7 @@ public:
     }
 
 private:
-    Reading finish() {
+    ReadResult finish() {
         out_.messages = std::move(report_.all);
         text::sort(out_.messages);
         return std::move(out_);
@@ -647,7 +647,7 @@ private:
     std::string folder_;  // of the file, with a slash at its end
     const ReadFile& read_file_;
     const IsAssumed& is_assumed_;
-    Reading out_;
+    ReadResult out_;
     Bus* bus_ = nullptr;
     SlaveInfo info_;
     std::set<std::string> pins_;
@@ -666,8 +666,8 @@ private:
 
 }  // namespace
 
-Reading read_lcec(std::string_view xml, const std::string& path, const ReadFile& read_file,
-                  const IsAssumed& is_assumed) {
+ReadResult read_lcec(std::string_view xml, const std::string& path, const ReadFile& read_file,
+                     const IsAssumed& is_assumed) {
     return Lcec(xml, path, read_file, is_assumed).read();
 }
 

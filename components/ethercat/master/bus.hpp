@@ -117,11 +117,11 @@ struct Bus {
     void report(Event event, const Device& d, std::int64_t first = 0,
                 std::int64_t second = 0) noexcept {
         const auto n = static_cast<std::uint32_t>(d.slave.configured);
-        events.report(event, d.slave.configured >= 0 ? n : Events::of_position + d.slave.position,
-                      first, second);
+        events.on_event(event, d.slave.configured >= 0 ? n : Events::of_position + d.slave.position,
+                        first, second);
     }
     void report(Event event, std::int64_t first = 0, std::int64_t second = 0) noexcept {
-        events.report(event, Events::bus, first, second);
+        events.on_event(event, Events::bus, first, second);
     }
     /// Starts a task on the channel of a device: run(d, [&] { return boot(d.channel, bus, d); }).
     template <class Make>

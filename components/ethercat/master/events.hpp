@@ -105,8 +105,8 @@ public:
     static constexpr std::uint32_t nothing =
         0xffff'fffe;  ///< neighbour of Event::damaged_frames: the port is open
     virtual ~Events() = default;
-    virtual void report(Event event, std::uint32_t slave, std::int64_t first,
-                        std::int64_t second) noexcept = 0;
+    virtual void on_event(Event event, std::uint32_t slave, std::int64_t first,
+                          std::int64_t second) noexcept = 0;
 };
 
 }  // namespace hal::ethercat::master

@@ -72,8 +72,8 @@ void report_unreadable(Bus& bus, std::uint16_t position, std::uint16_t control,
                        bool unloaded) noexcept {
     if (position >= bus.unreadable.size()) return;
     if (!bus.unreadable.test(position)) {
-        bus.events.report(Event::sii_failed, Events::of_position + position, control,
-                          unloaded ? 7 : 8);
+        bus.events.on_event(Event::sii_failed, Events::of_position + position, control,
+                            unloaded ? 7 : 8);
     }
     bus.unreadable.set(position);
 }
@@ -312,8 +312,8 @@ Device* find_present(Bus& bus, std::size_t configured) noexcept {
         }
         if (!d.refused) {
             const bool by_device_id = want.identity.device_id.has_value();
-            bus.events.report(Event::duplicate_alias, static_cast<std::uint32_t>(configured),
-                              by_device_id ? d.slave.device_id : d.slave.alias, d.slave.position);
+            bus.events.on_event(Event::duplicate_alias, static_cast<std::uint32_t>(configured),
+                                by_device_id ? d.slave.device_id : d.slave.alias, d.slave.position);
         }
         d.refused = true;
         found->refused = true;
@@ -359,8 +359,8 @@ void assign(Bus& bus) noexcept {
         if (found != nullptr) {
             assign(bus, n, *found);
         } else if (!want.optional) {
-            bus.events.report(Event::slave_missing, static_cast<std::uint32_t>(n), want.position,
-                              0);
+            bus.events.on_event(Event::slave_missing, static_cast<std::uint32_t>(n), want.position,
+                                0);
         }
     }
     if (bus.setup.accept_other_slaves || bus.setup.slaves.empty()) return;

@@ -99,8 +99,8 @@ void report_unknown(Bus& bus, const BusSlave& found) noexcept {
     }
     if (std::exchange(bus.unknown_product, found.product) != found.product) {
         bus.unknown_reported = true;
-        bus.events.report(Event::unknown_slave, Events::of_position + found.position, found.vendor,
-                          found.product);
+        bus.events.on_event(Event::unknown_slave, Events::of_position + found.position,
+                            found.vendor, found.product);
     }
 }
 

@@ -277,9 +277,9 @@ bool WireEngine::add_datagram(AcyclicFrame& frame, FrameWriter& writer, std::uin
 void WireEngine::receive(std::int64_t now_ns) noexcept {
     now_ns_ = cycle_start_ns_ = now_ns;
     clock_.fresh = false;
-    drain(*primary_, 0);
+    receive_frames(*primary_, 0);
     if (backup_ != nullptr) {
-        drain(*backup_, 1);
+        receive_frames(*backup_, 1);
     }
     if (in_flight_ != 0) {
         expire();
@@ -288,7 +288,7 @@ void WireEngine::receive(std::int64_t now_ns) noexcept {
     wake();
 }
 
-void WireEngine::drain(ethernet::Port& port, unsigned number) noexcept {
+void WireEngine::receive_frames(ethernet::Port& port, unsigned number) noexcept {
     while (const auto arrival = port.receive(now_ns_)) {
         arrived(arrival->bytes, number);
     }

@@ -105,7 +105,7 @@ private:
         std::int64_t sent_ns = 0;
     };
 
-    void drain(ethernet::Port& port, unsigned number) noexcept;
+    void receive_frames(ethernet::Port& port, unsigned number) noexcept;
     void arrived(std::span<const std::uint8_t> bytes, unsigned number) noexcept;
     bool answers(const Flight&, std::uint8_t index,
                  std::span<const std::uint8_t> bytes) const noexcept;

@@ -42,10 +42,10 @@ public:
             heard.code = emergency->code;
             ++heard.count;
         }
-        events_.report(master::Event::emergency,
-                       named ? static_cast<std::uint32_t>(slave.configured)
-                             : master::Events::of_position + slave.position,
-                       emergency->code | std::int64_t{emergency->error_register} << 16, data);
+        events_.on_event(master::Event::emergency,
+                         named ? static_cast<std::uint32_t>(slave.configured)
+                               : master::Events::of_position + slave.position,
+                         emergency->code | std::int64_t{emergency->error_register} << 16, data);
         return true;
     }
 

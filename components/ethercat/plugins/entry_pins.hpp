@@ -22,8 +22,8 @@ namespace hal::ethercat {
 class EntryPins {
 public:
     /// Inputs of the slaves are shown by the one function, outputs taken by the other. [setup]
-    EntryPins(Component& component, const Function& shows, const Function& takes)
-        : component_(component), shows_(shows), takes_(takes) {}
+    EntryPins(Component& component, const Function& receive, const Function& transmit)
+        : component_(component), receive_(receive), transmit_(transmit) {}
 
     /// Declares the pin of an entry at bit `at` of its process data. `prefix` ends with a dot.
     /// [setup]
@@ -40,7 +40,7 @@ public:
         }
         if ((is_real(e) || (output && e.scaled)) && !invalid_) {
             invalid_ = std::make_unique<Out<std::uint32_t>>(
-                component_, shows_, "invalid",
+                component_, receive_, "invalid",
                 "real values that are not finite, of slaves and of input pins, counted in each "
                 "cycle: the pin or the entry keeps the last finite value");
         }
@@ -70,14 +70,14 @@ public:
                 pin = value;
             }
         });
-        invalid += taken_invalid_.exchange(0, std::memory_order_relaxed);
+        invalid += transmitted_invalid_.exchange(0, std::memory_order_relaxed);
         if (invalid_ && invalid != 0) {
             *invalid_ = *invalid_ + invalid;
         }
     }
     /// Copies pins to outputs of the slaves, limited to the range of the entry. [realtime]
     /// Returns whether an input pin is not finite: its entry keeps the last value.
-    bool take(std::span<const std::span<std::uint8_t>> areas) noexcept {
+    bool transmit(std::span<const std::span<std::uint8_t>> areas) noexcept {
         std::uint32_t invalid = 0;
         ins_.each([areas, &invalid]<class T>(const In<T>& pin, const Place& p) noexcept {
             T value = pin.get();
@@ -90,7 +90,7 @@ public:
             }
             p.write(areas[p.area], p.codec.encode(value));
         });
-        taken_invalid_.fetch_add(invalid, std::memory_order_relaxed);
+        transmitted_invalid_.fetch_add(invalid, std::memory_order_relaxed);
         return invalid != 0;
     }
 
@@ -145,19 +145,19 @@ private:
         std::snprintf(about, sizeof about, "object 0x%04X:%u, %u bits%s", e.index, e.sub, e.bits,
                       e.copied ? ", copied from another slave: what was sent" : "");
         if (output) {
-            ins_.declare(component_, &takes_, type, name, about, place);
+            ins_.declare(component_, &transmit_, type, name, about, place);
         } else {
-            outs_.declare(component_, &shows_, type, name, about, place);
+            outs_.declare(component_, &receive_, type, name, about, place);
         }
     }
 
     Component& component_;
-    const Function &shows_, &takes_;
+    const Function &receive_, &transmit_;
     AnyIns<Place> ins_;
     AnyOuts<Place> outs_;
     std::unique_ptr<Out<std::uint32_t>> invalid_;  // if there are real values
     // counted by take(), added to the pin by show()
-    std::atomic<std::uint32_t> taken_invalid_{0};
+    std::atomic<std::uint32_t> transmitted_invalid_{0};
 };
 
 }  // namespace hal::ethercat

@@ -89,7 +89,7 @@ struct EthercatArguments {
                         "config=FILE.xml"
                       : "");
         }
-        config::Reading reading =
+        config::ReadResult reading =
             config::read(text, path, config::read_from_disk, [](const std::string& slave) {
             const auto* const assumed = hal::extension<hal_assumed>(HAL_ASSUMED);
             return assumed != nullptr && assumed->is_assumed(hal::detail::creating, slave.c_str());

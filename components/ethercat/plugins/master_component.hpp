@@ -15,7 +15,7 @@
 
 #include "bus/component/bus_component.hpp"
 #include "ethercat/config/event_filter.hpp"
-#include "ethercat/config/event_words.hpp"
+#include "ethercat/config/event_texts.hpp"
 #include "ethercat/master/gateway.hpp"
 #include "ethercat/master/master.hpp"
 #include "ethercat/master/request_queue.hpp"
@@ -217,7 +217,7 @@ public:
         }
         // The thread was declared hung, but its cycle goes on.
         if (interrupted()) return;
-        record_invalid_inputs(entries_.take(areas_));
+        record_invalid_inputs(entries_.transmit(areas_));
         each_channel(cycle, [](Channel& channel, const SlaveImage& image) noexcept {
             channel.write(image);
         });
@@ -558,8 +558,8 @@ private:
     }
 
     // Events of the master. [realtime]
-    void report(Event event, std::uint32_t slave, std::int64_t first,
-                std::int64_t second) noexcept override {
+    void on_event(Event event, std::uint32_t slave, std::int64_t first,
+                  std::int64_t second) noexcept override {
         if (filter_.is_new(event, slave, first, second)) {
             reporter_.tell({event, slave, first, second});
         }
@@ -620,8 +620,8 @@ private:
     std::unique_ptr<master::Gateway> gateway_;
     bool slaves_changed_ = false;
     hal::Reporter<config::EventRecord> reporter_{name_, [this](const config::EventRecord& h) {
-        return config::event_words(h, bus_.setup, bus_.link, bus_.backup,
-                                   bus_.lcec ? config::Format::lcec : config::Format::ethercat);
+        return config::event_text(h, bus_.setup, bus_.link, bus_.backup,
+                                  bus_.lcec ? config::Format::lcec : config::Format::ethercat);
     }, 256, [](const config::EventRecord& h, const std::string&) { return config::subject(h); }};
     std::vector<hal::LastingFault> slave_faults_, clock_faults_, data_faults_;  // by slave
     hal::LastingFault period_fault_, unknown_fault_, nobody_fault_, link_fault_, other_fault_;

@@ -11,7 +11,6 @@ namespace {
 
 using namespace hal::messages;
 
-
 struct CanReceive : hal::Component {
     using Component::Component;
 
@@ -112,7 +111,7 @@ private:
             malformed = malformed + 1;
             return false;
         }
-        if (!pins.load(frame.data)) {
+        if (pins.show(frame.data)) {
             *invalid = *invalid + 1;
         }
         id_offset = frame.id - first_;

@@ -80,14 +80,14 @@ struct CanSend : hal::Component {
         const std::int64_t now = cycle.start_ns();
         hal::can::Frame frame;
         frame.length = layout.bytes();
-        const bool is_valid = pins.store(frame.data);
+        const bool is_invalid = pins.transmit(frame.data);
         const bool is_new = on_change && frame.data != last_data_;
         if (due(cycle) || trigger || is_new) {
             frame.id =
                 first_ + std::min<std::uint32_t>(id_offset, static_cast<std::uint32_t>(ids - 1));
             frame.extended = first_ > 0x7ff;
             last_data_ = frame.data;
-            if (counter_.count(link_->send(frame, now)) && !is_valid) {
+            if (counter_.count(link_->send(frame, now)) && is_invalid) {
                 *invalid = *invalid + 1;
             }
         }

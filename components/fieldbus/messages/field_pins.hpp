@@ -24,47 +24,47 @@ public:
     }
     /// Whether a field can be NaN or infinite. [setup]
     bool has_reals() const noexcept { return has_reals_; }
-    /// Stores the values; those out of a field's range are limited to it. Returns false when one is
-    /// NaN or infinite: then the last finite one is stored, 0 before there is one. [realtime]
-    bool store(std::span<std::uint8_t> data) noexcept {
-        bool valid = true;
-        pins_.each([data, &valid](const auto& pin, Place& p) noexcept {
+    /// Copies the pins to the data of a message, limited to the range of each field. Returns
+    /// whether a pin is not finite: its field has the last finite value, 0 before there is one. [realtime]
+    bool transmit(std::span<std::uint8_t> data) noexcept {
+        bool is_invalid = false;
+        pins_.each([data, &is_invalid](const auto& pin, Place& p) noexcept {
             const auto value = pin.get();
             if constexpr (std::same_as<std::remove_const_t<decltype(value)>, double>) {
                 if (std::isfinite(value)) {
                     p.last = value;
                 } else {
-                    valid = false;
+                    is_invalid = true;
                 }
                 write_bits(data, p.at, p.codec.bits(), p.codec.encode(p.last));
             } else {
                 write_bits(data, p.at, p.codec.bits(), p.codec.encode(value));
             }
         });
-        return valid;
+        return is_invalid;
     }
-    /// Sets the pins from data that are long enough. Returns false when a value is NaN or infinite:
-    /// then its pin keeps the one before. [realtime]
-    bool load(std::span<const std::uint8_t> data) noexcept {
-        bool valid = true;
-        pins_.each([data, &valid]<class T>(Out<T>& pin, const Place& p) noexcept {
+    /// Sets the pins from the data of a message, which are long enough. Returns whether a value is
+    /// not finite: its pin keeps the one before. [realtime]
+    bool show(std::span<const std::uint8_t> data) noexcept {
+        bool is_invalid = false;
+        pins_.each([data, &is_invalid]<class T>(Out<T>& pin, const Place& p) noexcept {
             const T value = p.codec.template decode<T>(read_bits(data, p.at, p.codec.bits()));
             if constexpr (std::same_as<T, double>) {
                 if (!std::isfinite(value)) {
-                    valid = false;
+                    is_invalid = true;
                     return;
                 }
             }
             pin = value;
         });
-        return valid;
+        return is_invalid;
     }
 
 private:
     struct Place {
         std::size_t at;  ///< in bits
         PinCodec codec;
-        double last;  ///< the last finite value of a real field that was stored
+        double last;  ///< the last finite value of a real field that was transmitted
     };
     AnyPins<direction, Place> pins_;
     bool has_reals_ = false;

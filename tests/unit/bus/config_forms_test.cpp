@@ -49,7 +49,7 @@ TEST(ValueType, Old_names_are_found_and_marked) {
     EXPECT_EQ(parse_esi_type("s16").name, nullptr);
 }
 
-std::string messages(const canopen::config::Reading& reading) {
+std::string messages(const canopen::config::ReadResult& reading) {
     std::string out;
     for (const auto& m : reading.messages) {
         out += text::message_text("m.canopen", m.severity, m.at, m.sentence, m.help) + "\n";

@@ -4,7 +4,7 @@
 namespace hal::ethercat::config {
 namespace {
 
-std::string messages(const Reading& reading) {
+std::string messages(const ReadResult& reading) {
     std::string out;
     for (const Message& m : reading.messages) {
         out += text::message_text("m.ethercat", m.severity, m.at, m.sentence, m.help) + "\n";
@@ -13,7 +13,7 @@ std::string messages(const Reading& reading) {
 }
 
 TEST(EthercatForms, Sub_index_of_two_digits_is_decimal_and_reported) {
-    const Reading reading = read(
+    const ReadResult reading = read(
         "[bus]\n[slave 0 a]\ndevice = cia402\noutputs = 2000:10 u16, 0x2000:0x10 u16\n"
         "2000:0x0A.scale = 2\nsdo 2001:20 u8 = 1\n",
         "m.ethercat");
@@ -34,7 +34,7 @@ TEST(EthercatForms, Sub_index_of_two_digits_is_decimal_and_reported) {
 }
 
 TEST(EthercatForms, Old_types_and_sub_indices_are_read_and_reported) {
-    const Reading reading = read(
+    const ReadResult reading = read(
         "[bus]\n[slave 0 a]\ndevice = cia402\noutputs = 2000:1F real32 2000:1 UINT 2000:2 i8\n",
         "m.ethercat");
     EXPECT_EQ(messages(reading),
@@ -52,7 +52,7 @@ TEST(EthercatForms, Old_types_and_sub_indices_are_read_and_reported) {
 }
 
 TEST(EthercatForms, Unit_leaves_a_type_that_is_given_as_in_canopen) {
-    const Reading reading = read(
+    const ReadResult reading = read(
         "[bus]\n[slave 0 a]\ndevice = cia402\noutputs = 2000:1 s32 2000:2 s32\n"
         "2000:1.unit = mm\n2000:1.type = s32\n2000:2.unit = mm\n",
         "m.ethercat");
@@ -65,7 +65,7 @@ TEST(EthercatForms, Unit_leaves_a_type_that_is_given_as_in_canopen) {
 }
 
 TEST(EthercatForms, Unit_leaves_a_type_that_is_given_under_another_spelling) {
-    const Reading reading = read(
+    const ReadResult reading = read(
         "[bus]\n[slave 0 a]\ndevice = cia402\ninputs = 6041 6064\n"
         "6041.unit = bits\nstatusword.type = u16\n0x6064.type = s32\n6064:0.unit = counts\n",
         "m.ethercat");
@@ -79,7 +79,7 @@ TEST(EthercatForms, Unit_leaves_a_type_that_is_given_under_another_spelling) {
 }
 
 TEST(EthercatForms, Object_without_a_name_has_a_pin_with_a_decimal_sub_index) {
-    const Reading reading = read(
+    const ReadResult reading = read(
         "[bus]\n[slave 0 a]\ndevice = cia402\noutputs = 2000:1 u8 2000:0x0A u8 2000:0x1F u8\n"
         "2000:0x0A.unit = mm\n",
         "m.ethercat");
@@ -107,7 +107,7 @@ TEST(EthercatForms, Generated_ranges_keep_their_meaning_in_earlier_versions) {
     io.tx.push_back(pdo);
     const std::string text = write("sim:line", 1'000'000, {io});
     EXPECT_NE(text.find("inputs  = 6000:1..0x10 bit\n"), text.npos) << text;
-    const Reading reading = read(text, "m.ethercat");
+    const ReadResult reading = read(text, "m.ethercat");
     EXPECT_EQ(messages(reading), "");
     EXPECT_EQ(reading.buses[0].setup.slaves[0].sync_managers[0].pdos[0].entries.size(), 16U);
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The pages have the tables that the readers of the files are made of.
 #include "canopen/master/config/master_config.hpp"
-#include "fieldbus/scocan/table/table.hpp"
+#include "fieldbus/scocan/config/table.hpp"
 #include "fieldbus/tdma/config/schedule.hpp"
 #include "hal/read_file.hpp"
 #ifdef HALCYON_ETHERCAT

@@ -36,7 +36,7 @@ struct OnBus : MasterEvents {
         EXPECT_TRUE(opened) << opened.problem;
         return std::move(opened.link);
     }
-    struct Node : Events {
+    struct Node : DeviceEvents {
         Node(std::uint8_t id, const Description& d, std::unique_ptr<can::Link> l)
             : device(d, {.node_id = id, .queue = 64}, *this), link(std::move(l)) {}
         Device device;
@@ -88,7 +88,7 @@ struct OnBus : MasterEvents {
     }
     Time now = second;
     Time dt = 100 * microsecond;
-    Events own_events;
+    DeviceEvents own_events;
     Device own;
     Master master;
     std::unique_ptr<can::Link> link;

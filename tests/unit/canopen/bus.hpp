@@ -105,7 +105,7 @@ private:
 };
 
 /// Records the events of a device for inspection.
-struct Recorder : Events {
+struct Recorder : DeviceEvents {
     std::vector<NmtState> states;
     std::vector<unsigned> rpdos, late;
     std::vector<std::uint8_t> syncs;

@@ -170,11 +170,11 @@ inline bool files(const std::string& path, std::string& bytes) {
     return false;
 }
 
-inline Reading read_text(const std::string& text) {
+inline ReadResult read_text(const std::string& text) {
     return read(text, "machine/arm.canopen", files);
 }
 inline MasterConfig good(const std::string& text) {
-    Reading r = read_text(text);
+    ReadResult r = read_text(text);
     EXPECT_EQ(to_string(r, "arm"), "");
     return r.config;
 }

@@ -7,7 +7,7 @@
 namespace hal::canopen::config {
 namespace {
 
-Reading read_bus(const std::string& lines) {
+ReadResult read_bus(const std::string& lines) {
     return read("[bus]\n" + lines + "[node 5 x]\ndevice = cia401\n", "test.canopen",
                 [](const std::string&, std::string&) { return false; });
 }
@@ -25,7 +25,7 @@ std::vector<std::string> errors_of(const std::string& lines) {
 using Errors = std::vector<std::string>;
 
 TEST(ConfigMasters, One_that_follows_takes_its_phase_and_may_keep_its_own_clock) {
-    const Reading led = read_bus("sync = follow 2ms\nsync-phase = 300us\n");
+    const ReadResult led = read_bus("sync = follow 2ms\nsync-phase = 300us\n");
     ASSERT_TRUE(led.good());
     EXPECT_TRUE(led.config.sync_clock);
     EXPECT_EQ(led.config.sync_phase, 300 * microsecond);
@@ -35,7 +35,7 @@ TEST(ConfigMasters, One_that_follows_takes_its_phase_and_may_keep_its_own_clock)
 }
 
 TEST(ConfigMasters, A_flying_master_has_the_times_of_its_keys) {
-    const Reading r = read_bus(
+    const ReadResult r = read_bus(
         "flying-master = low\nnode-id = 9\nheartbeat = 20ms\nflying-delay = 1s\nflying-detect = "
         "2s\n");
     ASSERT_TRUE(r.good());

@@ -92,7 +92,7 @@ TEST(CanopenConfig, a_multiplexed_PDO_carries_its_objects_one_at_a_time) {
               "arm:4:9: error: tpdo1 is a multiplexed PDO: the device description does not list "
               "its objects; "
               "name them: tpdo1 = mpdo OBJECT, OBJECT");
-    const Reading as_it_is = read_text("[bus]\n[node 5]\neds = mpdo.eds\n");
+    const ReadResult as_it_is = read_text("[bus]\n[node 5]\neds = mpdo.eds\n");
     EXPECT_TRUE(as_it_is.good());
     ASSERT_EQ(as_it_is.messages.size(), 1U);
     EXPECT_EQ(as_it_is.messages[0].sentence,

@@ -130,7 +130,7 @@ const ObjectWrite* write_of(const Node& n, std::uint16_t index, std::uint8_t sub
 }
 
 TEST(CanopenConfig, writes_the_values_of_a_DCF_and_the_files_it_names) {
-    const Reading r = read_text("[bus]\n[node 5]\neds = unit/drive.dcf\n");
+    const ReadResult r = read_text("[bus]\n[node 5]\neds = unit/drive.dcf\n");
     ASSERT_TRUE(r.good()) << to_string(r, "arm");
     const Node& n = r.config.nodes[0];
     ASSERT_NE(write_of(n, 0x2002), nullptr);
@@ -158,7 +158,7 @@ TEST(CanopenConfig, reports_a_missing_file_that_a_DCF_names) {
 }
 
 TEST(CanopenConfig, does_not_download_the_program_that_a_DCF_names) {
-    const Reading r = read_text("[bus]\n[node 5]\neds = unit/program.dcf\n");
+    const ReadResult r = read_text("[bus]\n[node 5]\neds = unit/program.dcf\n");
     EXPECT_TRUE(r.good()) << to_string(r, "arm");
     EXPECT_EQ(write_of(r.config.nodes[0], 0x1f50, 1), nullptr);
     const auto about = std::find_if(r.messages.begin(), r.messages.end(), [](const Message& m) {
@@ -226,7 +226,7 @@ TEST(CanopenConfig, a_configuration_has_a_date_or_a_number_derived_from_its_writ
 }
 
 TEST(CanopenConfig, by_index_inputs_go_to_the_node_and_outputs_come_from_it) {
-    const Reading r = read(ByIndex{"24831", "24675,25600/16", "", 2, 1}, files);
+    const ReadResult r = read(ByIndex{"24831", "24675,25600/16", "", 2, 1}, files);
     ASSERT_TRUE(r.good()) << to_string(r, "");
     const Node& n = r.config.nodes[0];
     EXPECT_EQ(r.config.node_id, 1);

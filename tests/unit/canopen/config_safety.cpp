@@ -11,12 +11,12 @@
 namespace hal::canopen::config {
 namespace {
 
-Reading read_node(const std::string& keys, const std::string& id = "7") {
+ReadResult read_node(const std::string& keys, const std::string& id = "7") {
     return read("[bus]\nlink = sim:x\n[node " + id + " gate]\n" + keys, "x.canopen");
 }
 const std::string pair = "0x2300:1 u8 / 0x2301:1 u8";
 
-std::string first(const Reading& reading) {
+std::string first(const ReadResult& reading) {
     for (const Message& m : reading.messages) {
         if (m.severity == Severity::error) {
             return std::to_string(m.at.line) + ": " + m.sentence + "; " + m.help;
@@ -24,7 +24,7 @@ std::string first(const Reading& reading) {
     }
     return "";
 }
-std::uint32_t written(const Reading& reading, std::uint16_t index, std::uint8_t sub) {
+std::uint32_t written(const ReadResult& reading, std::uint16_t index, std::uint8_t sub) {
     std::uint32_t value = 0xffffffff;
     for (const auto& w : reading.config.nodes.at(0).setup.writes) {
         if (w.index == index && w.sub == sub) {

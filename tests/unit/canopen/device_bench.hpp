@@ -107,7 +107,7 @@ private:
 
 public:
     canopen::Node node;
-    Events events;
+    DeviceEvents events;
     FrameQueue out{256};
     Network network{out, events, {.timeout = 100 * millisecond}};
     std::vector<Frame> seen;

@@ -27,10 +27,10 @@ TEST(EdsCorpus, Files_of_real_devices_are_read_and_come_back_equal) {
     for (const auto& file : std::filesystem::directory_iterator(folder)) {
         std::ifstream in(file.path(), std::ios::binary);
         const std::string bytes{std::istreambuf_iterator<char>(in), {}};
-        const Reading reading = read_description(bytes);
+        const ReadResult reading = read_description(bytes);
         ASSERT_TRUE(reading.description) << file.path() << "\n" << complaints(reading);
         const DeviceDescription& d = *reading.description;
-        const Reading again = read_eds(write_eds(d));
+        const ReadResult again = read_eds(write_eds(d));
         EXPECT_TRUE(again.description && *again.description == d) << file.path();
         EXPECT_GT(d.entries(), 0u) << file.path();
         for (const Message& message : reading.messages) {

@@ -7,7 +7,7 @@ namespace hal::canopen::eds::test {
 namespace {
 
 TEST(EdsRead, A_correct_file_has_no_messages) {
-    const Reading reading = read_eds(motor());
+    const ReadResult reading = read_eds(motor());
     ASSERT_TRUE(reading.description);
     EXPECT_EQ(complaints(reading, Severity::note), "");
     const DeviceDescription& d = *reading.description;
@@ -30,7 +30,7 @@ TEST(EdsRead, A_correct_file_has_no_messages) {
 
 TEST(EdsRead, A_commissioning_makes_it_a_dcf) {
     for (const char* name : {"DeviceComissioning", "DeviceCommissioning"}) {
-        const Reading reading = read_eds(motor(
+        const ReadResult reading = read_eds(motor(
             "[" + std::string(name) +
             "]\nNodeID=0x05\nNodeName=left\nBaudrate=1000\nNetNumber=2\nLSS_SerialNumber=0x77\n"));
         ASSERT_TRUE(reading.description && reading.description->commissioning);
@@ -54,7 +54,7 @@ class EdsDefect : public testing::TestWithParam<Defect> {};
 TEST_P(EdsDefect, Is_named_with_its_line_and_survived) {
     const Defect& defect = GetParam();
     const std::string text = motor(defect.added, defect.optional, defect.manufacturer);
-    const Reading reading = read_eds(text);
+    const ReadResult reading = read_eds(text);
     ASSERT_TRUE(reading.description);
     const std::string all = complaints(reading, Severity::note);
     const std::string wanted = line_of(text, defect.at);
@@ -174,7 +174,7 @@ TEST(EdsRead, Counts_that_do_not_agree_are_named) {
     std::string text = motor();
     text.replace(text.find("Lines=2"), 7, "Lines=5");
     text.replace(text.find("SupportedObjects=3"), 18, "SupportedObjects=4");
-    const Reading reading = read_eds(text);
+    const ReadResult reading = read_eds(text);
     const std::string all = complaints(reading, Severity::note);
     EXPECT_NE(all.find("'Lines' of [Comments] is 5, there are 2"), std::string::npos) << all;
     EXPECT_NE(all.find("'SupportedObjects' of [MandatoryObjects] is 4, the section lists 3"),
@@ -201,7 +201,7 @@ TEST(EdsRead, Texts_of_every_encoding_are_read) {
     const DeviceDescription wanted = *read_eds(plain).description;
     EXPECT_EQ(wanted.find(0x2000, 0)->default_value, "25 °C");
     for (const std::string& text : {wide, windows, dos, old}) {
-        const Reading reading = read_eds(text);
+        const ReadResult reading = read_eds(text);
         ASSERT_TRUE(reading.description);
         EXPECT_EQ(*reading.description, wanted);
     }
@@ -224,7 +224,7 @@ TEST(EdsRead, What_is_no_description_is_refused_with_the_reason) {
                       std::string(500, '\0'),
                   "not a text file"}};
     for (const auto& one : cases) {
-        const Reading reading = read_eds(one.text);
+        const ReadResult reading = read_eds(one.text);
         EXPECT_FALSE(reading.description);
         ASSERT_FALSE(reading.messages.empty());
         EXPECT_NE(to_string(reading.messages.back()).find(one.why), std::string::npos)
@@ -234,7 +234,7 @@ TEST(EdsRead, What_is_no_description_is_refused_with_the_reason) {
 }
 
 TEST(EdsRead, Compact_objects_are_expanded) {
-    const Reading reading =
+    const ReadResult reading =
         read_eds(motor("[2000]\nParameterName=Speed\nObjectType=0x8\nDataType=0x0004\nAccessType="
                        "rw\nDefaultValue=7\nPDOMapping=1\nCompactSubObj=3\n"
                        "[2000Name]\nNrOfEntries=1\n2=Middle\n[2000Value]\nNrOfEntries=1\n3=-9\n["
@@ -264,7 +264,7 @@ TEST(EdsRead, Modules_are_joined_to_the_device) {
         "M2FixedObjects]\nNrOfEntries=1\n1=0x2100\n"
         "[M22100]\nParameterName=Own\nDataType=6\nAccessType=rw\nDefaultValue=3\n"
         "[ConnectedModules]\nNrOfEntries=3\n1=1\n2=2\n3=1\n");
-    const Reading reading = read_eds(text);
+    const ReadResult reading = read_eds(text);
     ASSERT_TRUE(reading.description);
     EXPECT_EQ(complaints(reading), "");
     DeviceDescription d = *reading.description;
@@ -284,7 +284,7 @@ TEST(EdsRead, Modules_are_joined_to_the_device) {
 TEST(EdsRead, Compact_pdos_are_made) {
     std::string text = motor();
     text.replace(text.find("NrOfRXPDO=0"), 11, "NrOfRXPDO=2\nCompactPDO=0x13");
-    const Reading reading = read_eds(text);
+    const ReadResult reading = read_eds(text);
     const DeviceDescription& d = *reading.description;
     ASSERT_NE(d.find(0x1401), nullptr);
     EXPECT_EQ(d.find(0x1401, 1)->default_value, "$NODEID+0x300");

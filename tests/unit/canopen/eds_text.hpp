@@ -57,7 +57,7 @@ inline std::string variable(const std::string& index, const std::string& type,
 }
 
 /// All messages but notes, a line each; the whole of what is wrong.
-inline std::string complaints(const Reading& reading, Severity min = Severity::warning) {
+inline std::string complaints(const ReadResult& reading, Severity min = Severity::warning) {
     std::string text;
     for (const Message& message : reading.messages) {
         if (message.severity >= min) {

@@ -50,7 +50,7 @@ protected:
 };
 
 TEST_F(Xdd, Is_read_into_the_same_structures_as_an_eds) {
-    const Reading reading = read_description(
+    const ReadResult reading = read_description(
         xdd("<CANopenObject index=\"2000\" objectType=\"7\" uniqueIDRef=\"P1\" "
             "PDOmapping=\"optional\"/>\n"
             "<CANopenObject index=\"1018\" name=\"Identity\" objectType=\"9\" subNumber=\"2\">"
@@ -86,7 +86,7 @@ TEST_F(Xdd, A_parameter_without_access_can_be_read_as_the_schema_says) {
         "<CANopenObject index=\"2001\" objectType=\"7\" uniqueIDRef=\"P1\" accessType=\"wo\"/>\n");
     text.replace(text.find(" access=\"readWrite\""), std::string(" access=\"readWrite\"").size(),
                  "");
-    const Reading reading = read_xdd(text);
+    const ReadResult reading = read_xdd(text);
     ASSERT_TRUE(reading.description) << complaints(reading);
     EXPECT_EQ(complaints(reading, Severity::note), "");
     EXPECT_EQ(reading.description->find(0x2000, 0)->access, Access::ro);
@@ -94,7 +94,7 @@ TEST_F(Xdd, A_parameter_without_access_can_be_read_as_the_schema_says) {
 }
 
 TEST_F(Xdd, A_configuration_has_node_id_and_values) {
-    const Reading reading =
+    const ReadResult reading =
         read_xdd(xdd("<CANopenObject index=\"2000\" name=\"x\" objectType=\"7\" dataType=\"0006\" "
                      "accessType=\"rw\" defaultValue=\"1\" "
                      "actualValue=\"2\"/>\n",
@@ -117,7 +117,7 @@ TEST_F(Xdd, Defects_are_named_with_their_line) {
             "accessType=\"rw\"/>\n<CANopenObject name=\"q\"/>\n"
             "<CANopenObject index=\"2002\" name=\"r\" objectType=\"7\" uniqueIDRef=\"P9\" "
             "dataType=\"0005\" accessType=\"rw\"/>\n");
-    const Reading reading = read_xdd(text);
+    const ReadResult reading = read_xdd(text);
     const std::string all = complaints(reading);
     for (const auto& [at, message] :
          {std::pair{"index=\"2000\"", "'300' does not fit into UNSIGNED8"},
@@ -133,7 +133,7 @@ TEST_F(Xdd, Defects_are_named_with_their_line) {
 }
 
 /// Messages of severity note and above, without their places, keys in the spelling of the EDS.
-std::string without_places(const Reading& reading) {
+std::string without_places(const ReadResult& reading) {
     std::string all;
     for (const Message& message : reading.messages) {
         std::string text = message.sentence + "; " + message.help + "\n";
@@ -164,11 +164,11 @@ TEST_F(Xdd, A_doubtful_number_gets_the_message_of_an_eds) {
         for (const char* text : {"-1", "0377", "010", "09", "1.0", "1A", "70000", "true", "0xFF",
                                  "-300", "0x3F800000", "5", "abc"}) {
             for (const auto& [ini, xml] : keys) {
-                const Reading eds = read_eds(
+                const ReadResult eds = read_eds(
                     std::string("[OptionalObjects]\nSupportedObjects=1\n1=0x2000\n[2000]\n"
                                 "ParameterName=x\nObjectType=7\nAccessType=rw\nDataType=0x") +
                     type + "\n" + ini + "=" + text + "\n");
-                const Reading xdd_reading = read_xdd(
+                const ReadResult xdd_reading = read_xdd(
                     xdd(std::string("<CANopenObject index=\"2000\" name=\"x\" objectType=\"7\" "
                                     "accessType=\"rw\" dataType=\"") +
                         type + "\" " + xml + "=\"" + text + "\"/>\n"));
@@ -178,7 +178,7 @@ TEST_F(Xdd, A_doubtful_number_gets_the_message_of_an_eds) {
         }
     }
     EXPECT_GT(warned, 100u);
-    const Reading read =
+    const ReadResult read =
         read_xdd(xdd("<CANopenObject index=\"2000\" name=\"x\" objectType=\"7\" dataType=\"0005\" "
                      "accessType=\"rw\" actualValue=\"-1\" defaultValue=\"0377\"/>\n"));
     EXPECT_EQ(
@@ -200,10 +200,10 @@ TEST_F(Xdd, A_number_of_the_device_with_a_leading_zero_or_a_sign_is_named) {
 }
 
 TEST_F(Xdd, Broken_xml_and_other_xml_are_refused_with_the_reason) {
-    const Reading broken = read_description(xdd("<CANopenObject index=\"2000\">\n"));
+    const ReadResult broken = read_description(xdd("<CANopenObject index=\"2000\">\n"));
     EXPECT_FALSE(broken.description);
     EXPECT_NE(complaints(broken, Severity::error).find("the XML is broken"), std::string::npos);
-    const Reading other = read_description("<?xml version=\"1.0\"?>\n<html><body/></html>\n");
+    const ReadResult other = read_description("<?xml version=\"1.0\"?>\n<html><body/></html>\n");
     EXPECT_FALSE(other.description);
     EXPECT_NE(complaints(other, Severity::error).find("no CANopenObjectList"), std::string::npos);
 }

@@ -41,7 +41,7 @@ struct BusyLink final : can::Link {
     bool busy = false;
 };
 
-struct Wire : RunnerEvents {
+struct Wire : Events {
     explicit Wire(const std::string& more = "", bool starts_itself = false,
                   const std::string& axis = one_axis)
         : reading(config::read(axis + more, "x.canopen")),
@@ -52,7 +52,7 @@ struct Wire : RunnerEvents {
         EXPECT_TRUE(reading.good());
         node = std::make_unique<Node>(drive, open(),
                                       DeviceSettings{.node_id = 2, .auto_start = starts_itself});
-        runner.open(*link);
+        runner.attach(*link);
         for (Slot& s : runner.slots()) {
             if (s.to_node && s.object->bits == 32) {
                 target = &s;
@@ -125,7 +125,7 @@ struct Wire : RunnerEvents {
     unsigned rpdos = 0;
     std::vector<Foreign> foreign;
     std::vector<std::pair<std::size_t, unsigned>> cut;
-    config::Reading reading;
+    config::ReadResult reading;
     Runner runner;
     std::unique_ptr<can::Link> link, ear;
     DriveProgram drive;
@@ -401,7 +401,7 @@ TEST(Runner, What_is_sent_on_a_change_is_sent_again_when_a_dead_wire_is_back) {
 TEST(Runner, Safe_values_that_the_link_did_not_take_are_sent_with_the_next_call) {
     Wire w;
     BusyLink busy(*w.link);
-    w.runner.open(busy);
+    w.runner.attach(busy);
     for (int n = 0; n < 5000 && !w.runner.operational(0); ++n) {
         w.step();
     }

@@ -46,7 +46,7 @@ TEST(Memory, Is_not_taken_after_setup) {
     d.add_domain(0x2006, 0, Access::read_write, 5000);
     add_rpdo(d, 1, {.mapping = {map_entry(0x2000, 0, 32)}});
     add_tpdo(d, 1, {.transmission = 1, .mapping = {map_entry(0x2000, 0, 64)}});
-    Events events;
+    DeviceEvents events;
     Device device(d, {.node_id = 5}, events);
     FrameQueue out(1024);
     Network network(out, events);
@@ -124,7 +124,7 @@ TEST(Memory, Is_not_taken_while_a_master_boots_loses_and_restarts_nodes) {
         add_tpdo(d, 1, {.mapping = {map_entry(0x2000, 0, 32)}});
         return d;
     };
-    Events events;
+    DeviceEvents events;
     Device good(with_program(), {.node_id = 5}, events),
         wrong(with_program(), {.node_id = 6}, events);
     NodeSetup n;

@@ -13,7 +13,7 @@ bool read_test_file(const std::string& path, std::string& bytes) {
 }
 
 Bus good(const std::string& text) {
-    Reading r = read(text, "m.ethercat", read_test_file);
+    ReadResult r = read(text, "m.ethercat", read_test_file);
     EXPECT_EQ(to_string(r, "m.ethercat"), "");
     return r.buses.at(0);
 }
@@ -105,7 +105,7 @@ TEST(EthercatConfig, Objects_of_a_drive_have_the_sign_of_CiA_402) {
         };
     };
     const auto types = [&](const std::string& profile) {
-        const Reading r =
+        const ReadResult r =
             read("[bus]\n[slave 0 d]\nesi = d.xml\n", "d.ethercat", description(profile));
         std::vector<master::Type> all;
         for (const master::Entry& e :
@@ -140,7 +140,7 @@ TEST(EthercatConfig, Generated_netlist_links_pins_of_equal_types_only) {
             "</TxPdo></Device></Devices></Descriptions></EtherCATInfo>";
         return true;
     };
-    const Reading r = read("[bus]\n[slave 0 d]\nesi = d.xml\n", "d.ethercat", description);
+    const ReadResult r = read("[bus]\n[slave 0 d]\nesi = d.xml\n", "d.ethercat", description);
     const std::string text = netlist(r.buses.at(0), "d.ethercat", "");
     const auto has = [&](const std::string& part) { return text.find(part) != text.npos; };
     EXPECT_TRUE(has("=> ethercat.0.d.controlword\n"));
@@ -192,8 +192,8 @@ bool read_revisions(const std::string&, std::string& bytes) {
 
 TEST(EthercatConfig, Revision_selects_the_description) {
     const auto slave = [](const std::string& lines) {
-        Reading r = read("[bus]\n[slave 0 a]\nesi = my boxes, all: new.xml\n" + lines, "m.ethercat",
-                         read_revisions);
+        ReadResult r = read("[bus]\n[slave 0 a]\nesi = my boxes, all: new.xml\n" + lines,
+                            "m.ethercat", read_revisions);
         EXPECT_EQ(to_string(r, "m.ethercat"), "");
         return r.buses.at(0).setup.slaves.at(0);
     };
@@ -228,7 +228,7 @@ bool read_commanded(const std::string&, std::string& bytes) {
 }
 
 TEST(EthercatConfig, A_mapping_that_start_up_commands_write_is_restored) {
-    const Reading r = read("[bus]\n[slave 0 a]\nesi = box.xml\n", "m.ethercat", read_commanded);
+    const ReadResult r = read("[bus]\n[slave 0 a]\nesi = box.xml\n", "m.ethercat", read_commanded);
     EXPECT_EQ(to_string(r, "m.ethercat"), "");
     const auto& pdos = r.buses.at(0).setup.slaves.at(0).sync_managers.at(0).pdos;
     ASSERT_EQ(pdos.size(), 2U);
@@ -252,8 +252,8 @@ bool read_modular(const std::string&, std::string& bytes) {
 
 TEST(EthercatConfig, Modules_that_do_not_fit_are_reported) {
     const auto messages = [](const std::string& modules) {
-        const Reading r = read("[bus]\n[slave 0 a]\nesi = box.xml\nmodules = " + modules + "\n",
-                               "m.ethercat", read_modular);
+        const ReadResult r = read("[bus]\n[slave 0 a]\nesi = box.xml\nmodules = " + modules + "\n",
+                                  "m.ethercat", read_modular);
         std::string text;
         for (const Message& m : r.messages) {
             text += text::message_text("", m.severity, m.at, m.sentence, m.help) + "\n";
@@ -273,7 +273,7 @@ TEST(EthercatConfig, Modules_that_do_not_fit_are_reported) {
 
 TEST(EthercatConfig, A_product_with_several_types_and_an_unknown_revision_are_reported) {
     const auto first = [](const std::string& lines) {
-        const Reading r =
+        const ReadResult r =
             read("[bus]\n[slave 0 a]\nesi = box.xml\n" + lines, "m.ethercat", read_revisions);
         return r.messages.empty() ? std::string()
                                   : r.messages.front().sentence + "; " + r.messages.front().help;

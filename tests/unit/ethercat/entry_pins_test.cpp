@@ -40,7 +40,7 @@ TEST(EthercatEntryPins, Real_wider_than_its_entry_leaves_the_bits_behind_it) {
         // ends with the entry: ASan reports an access behind it
         const auto image = std::make_unique<std::uint8_t[]>(2);
         const std::span<std::uint8_t> areas[] = {{image.get(), 2}};
-        entries.pins.take(areas);
+        entries.pins.transmit(areas);
         entries.pins.show(areas);
         EXPECT_EQ(host.value<std::uint32_t>("in"), 0xffffU);
     }
@@ -54,7 +54,7 @@ TEST(EthercatEntryPins, Real_of_the_width_of_its_entry_is_a_float) {
     host.value<double>("out") = -1.5;
     std::array<std::uint8_t, 4> image{};
     const std::span<std::uint8_t> areas[] = {image};
-    entries.pins.take(areas);
+    entries.pins.transmit(areas);
     entries.pins.show(areas);
     EXPECT_EQ(image, (std::array<std::uint8_t, 4>{0, 0, 0xc0, 0xbf}));
     EXPECT_EQ(host.value<double>("in"), -1.5);

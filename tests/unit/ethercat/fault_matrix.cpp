@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "tests/unit/ethercat/fault_matrix.hpp"
 
-#include "ethercat/config/event_words.hpp"
+#include "ethercat/config/event_texts.hpp"
 
 namespace fault_matrix {
 
@@ -35,7 +35,7 @@ std::string LastEvents::text(const master::Setup& setup) const {
     for (std::uint64_t n = count_ > events_.size() ? count_ - events_.size() : 0; n < count_; ++n) {
         const Record& r = events_[n % events_.size()];
         s += "\n  " + std::to_string(static_cast<int>(r.event)) + " " +
-             config::event_words({r.event, r.slave, r.first, r.second}, setup, "sim:line");
+             config::event_text({r.event, r.slave, r.first, r.second}, setup, "sim:line");
     }
     return s;
 }
@@ -50,7 +50,7 @@ Machine::Machine() {
                   .sii = devices[n].sii,
                   .application = devices[n].firmware.get()});
     }
-    const config::Reading read = config::read(configuration, "line.ethercat");
+    const config::ReadResult read = config::read(configuration, "line.ethercat");
     EXPECT_EQ(config::to_string(read, "line.ethercat"), "");
     setup = read.buses.at(0).setup;
     line.power_on(0);

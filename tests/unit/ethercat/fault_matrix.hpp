@@ -179,8 +179,8 @@ private:
 /// Keeps the newest events only, in one place of memory.
 class LastEvents final : public master::Events {
 public:
-    void report(master::Event event, std::uint32_t slave, std::int64_t first,
-                std::int64_t second) noexcept override {
+    void on_event(master::Event event, std::uint32_t slave, std::int64_t first,
+                  std::int64_t second) noexcept override {
         events_[count_++ % events_.size()] = {event, slave, first, second};
         if (event == master::Event::reference_clock) {
             reference = slave;

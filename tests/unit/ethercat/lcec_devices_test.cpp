@@ -658,7 +658,7 @@ TEST(LcecDevices, Safety_frames_are_copied_between_the_logic_and_its_terminals) 
         "value=\"reset\"/><modParam name=\"fsoeSlaveIdx\" value=\"3\"/><modParam "
         "name=\"fsoeSlaveIdx\" value=\"2\"/></slave>\n<slave idx=\"2\" type=\"EL1904\"/><slave "
         "idx=\"3\" type=\"EL2904\"/></master></masters>";
-    const config::Reading r = config::read(text, "c.xml");
+    const config::ReadResult r = config::read(text, "c.xml");
     ASSERT_EQ(config::to_string(r, "c.xml"), "");
     const config::Bus& bus = r.buses.at(0);
     ASSERT_EQ(bus.copies.size(), 4U);
@@ -695,7 +695,7 @@ TEST(LcecDevices, Safety_card_has_the_axes_of_the_drive_before_it) {
                 drive + "\" name=\"drive\"/></master></masters>",
             "c.xml");
     };
-    const auto outputs = [](const config::Reading& r) {
+    const auto outputs = [](const config::ReadResult& r) {
         std::size_t bits = 0;
         for (const auto& pdo : r.buses.at(0).setup.slaves.at(1).sync_managers.at(0).pdos) {
             for (const auto& entry : pdo.entries) {
@@ -704,13 +704,13 @@ TEST(LcecDevices, Safety_card_has_the_axes_of_the_drive_before_it) {
         }
         return bits / 8;
     };
-    const config::Reading two = machine("AX5203");
+    const config::ReadResult two = machine("AX5203");
     ASSERT_TRUE(two.good()) << config::to_string(two, "c.xml");
     EXPECT_EQ(outputs(two), 27U) << "DefaultSize of the card";
     ASSERT_EQ(two.buses[0].copies.size(), 2U);
     EXPECT_EQ(two.buses[0].copies[0].from.slave, 1U);
     EXPECT_EQ(two.buses[0].copies[0].bits, 88U) << "two channels of two bytes";
-    const config::Reading one = machine("AX5106");
+    const config::ReadResult one = machine("AX5106");
     ASSERT_TRUE(one.good());
     EXPECT_EQ(outputs(one), 15U);
     EXPECT_EQ(config::to_string(machine("EL1008"), "c.xml"),
@@ -719,7 +719,7 @@ TEST(LcecDevices, Safety_card_has_the_axes_of_the_drive_before_it) {
 }
 
 TEST(LcecDevices, Numbers_that_lcec_reads_in_part_are_read_with_a_warning) {
-    const config::Reading r = config::read(
+    const config::ReadResult r = config::read(
         "<masters><master idx=\"0\">\n<slave idx=\"0\" type=\"EL1008\"><sdoConfig idx=\"6093h\" "
         "subIdx=\"O\"><sdoDataRaw data=\"01\"/></sdoConfig></slave></master></masters>",
         "c.xml");

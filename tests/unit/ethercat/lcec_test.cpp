@@ -45,7 +45,7 @@ std::string errors(const std::string& slave) {
 }
 
 TEST(Lcec, Generic_slave_has_its_pins_and_settings) {
-    const Reading r = read(machine, "ethercat-conf.xml");
+    const ReadResult r = read(machine, "ethercat-conf.xml");
     ASSERT_EQ(to_string(r, "c.xml"), "");
     ASSERT_EQ(r.buses.size(), 1U);
     EXPECT_TRUE(r.lcec);
@@ -81,7 +81,7 @@ TEST(Lcec, Generic_slave_has_its_pins_and_settings) {
 }
 
 TEST(Lcec, Drive_class_has_the_pins_of_its_parameters) {
-    const Reading r = read(machine, "ethercat-conf.xml");
+    const ReadResult r = read(machine, "ethercat-conf.xml");
     const master::Slave& y = r.buses.at(0).setup.slaves.at(1);
     EXPECT_EQ(r.buses[0].setup.domains.at(y.domain).every, 2U);
     const SlaveInfo& info = r.buses[0].slaves.at(1);
@@ -131,7 +131,7 @@ TEST(Lcec, Idn_configuration_is_written_by_SoE_in_its_state) {
     const auto slave = [](const std::string& idns) {
         return "<slave idx=\"0\" type=\"generic\" vid=\"1\" pid=\"2\">" + idns + "</slave>";
     };
-    const Reading r =
+    const ReadResult r =
         read("<masters><master idx=\"0\">" +
                  slave("<idnConfig drive=\"1\" idn=\"P-0-150\" state=\"SAFEOP\"><idnDataRaw "
                        "data=\"07 00\"/><idnDataRaw data=\"0A\"/></idnConfig>"
@@ -190,7 +190,7 @@ TEST(Lcec, Init_commands_of_TwinCAT_are_written_at_their_transitions) {
             return path == "folder/init.xml" && !file.empty();
         });
     };
-    const Reading r = with(init_file);
+    const ReadResult r = with(init_file);
     ASSERT_EQ(to_string(r, "c.xml"), "");
     ASSERT_EQ(r.messages.size(), 1U);
     EXPECT_EQ(r.messages[0].sentence,

@@ -192,8 +192,8 @@ struct Log final : Events {
         std::int64_t first, second;
     };
     std::vector<Record> all;
-    void report(Event event, std::uint32_t slave, std::int64_t first,
-                std::int64_t second) noexcept override {
+    void on_event(Event event, std::uint32_t slave, std::int64_t first,
+                  std::int64_t second) noexcept override {
         all.push_back({event, slave, first, second});
     }
     std::size_t count(Event event) const {

@@ -68,7 +68,7 @@ std::string device(const std::string& pdos,
            "/></Mailbox></Device></Devices></Descriptions></EtherCATInfo>";
 }
 
-Reading with(const std::string& xml, const std::string& lines) {
+ReadResult with(const std::string& xml, const std::string& lines) {
     return read("[bus]\n[slave 0 a]\nesi = d.xml\n" + lines, "m.ethercat",
                 [&](const std::string&, std::string& text) {
         text = xml;
@@ -79,7 +79,7 @@ std::string errors(const std::string& xml, const std::string& lines) {
     return to_string(with(xml, lines), "m.ethercat");
 }
 
-std::string assigned(const Reading& r) {
+std::string assigned(const ReadResult& r) {
     std::string text;
     for (const auto& sm : r.buses.at(0).setup.slaves.at(0).sync_managers) {
         for (const auto& p : sm.pdos) {
@@ -106,7 +106,8 @@ TEST(PdoRules, Objects_are_mapped_in_PDOs_that_do_not_exclude_each_other) {
     const std::string pdos = pdo("RxPdo", "Sm=\"2\"", "1600", "1") +
                              pdo("RxPdo", "", "1601", "2", "<Exclude>#x1600</Exclude>") +
                              pdo("RxPdo", "", "1602", "3");
-    const Reading r = with(device(pdos), "entries-per-pdo = 2\noutputs = 7000:1 7000:2 7000:3\n");
+    const ReadResult r =
+        with(device(pdos), "entries-per-pdo = 2\noutputs = 7000:1 7000:2 7000:3\n");
     EXPECT_EQ(to_string(r, "m.ethercat"), "");
     EXPECT_EQ(assigned(r), "1600*2 1602*1 ") << "not 1601";
     EXPECT_EQ(errors(device(pdos),
@@ -119,7 +120,7 @@ TEST(PdoRules, Objects_are_mapped_in_PDOs_that_do_not_exclude_each_other) {
 TEST(PdoRules, The_dictionary_limits_the_objects_of_a_PDO) {
     const std::string pdos = pdo("RxPdo", "Sm=\"2\"", "1600", "1") + pdo("RxPdo", "", "1601", "2");
     const std::string xml = device(pdos, "PdoAssign=\"1\" PdoConfig=\"1\"", dictionary(3));
-    const Reading r = with(xml, "outputs = 7000:1..5\n");
+    const ReadResult r = with(xml, "outputs = 7000:1..5\n");
     EXPECT_EQ(to_string(r, "m.ethercat"), "");
     EXPECT_EQ(assigned(r), "1600*3 1601*2 ");
     EXPECT_EQ(errors(xml, "outputs = 7000:1..7\n"),
@@ -146,7 +147,7 @@ TEST(PdoRules, A_mandatory_PDO_must_be_assigned) {
               "m.ethercat:4:11: error: PDO 1600 of 'BOX' must be assigned; write it as well: "
               "outputs = 1600");
     EXPECT_EQ(errors(device(pdos), "outputs = 1600 1601\n"), "");
-    const Reading r = with(device(pdos), "outputs = 1600 7000:3 7000:2\n");
+    const ReadResult r = with(device(pdos), "outputs = 1600 7000:3 7000:2\n");
     EXPECT_EQ(to_string(r, "m.ethercat"), "");
     EXPECT_EQ(assigned(r), "16001 1602*2 ") << "fixed PDOs are not mapped";
 }
@@ -178,7 +179,7 @@ TEST(PdoRules, An_entry_longer_than_its_object_is_a_warning) {
     pdos.replace(pdos.find("<BitLen>16"), 10, "<BitLen>32");
     const std::string xml = device(pdos, "PdoAssign=\"1\" PdoConfig=\"1\"", dictionary(3));
     EXPECT_EQ(errors(xml, "outputs = 1600\n"), "");
-    const Reading reading = with(xml, "outputs = 1600\n");
+    const ReadResult reading = with(xml, "outputs = 1600\n");
     ASSERT_EQ(reading.messages.size(), 1U);
     EXPECT_EQ(reading.messages[0].severity, Severity::warning);
     EXPECT_EQ(reading.messages[0].sentence, "PDO 1600 maps 32 bits of object 7000:1, which has 16");

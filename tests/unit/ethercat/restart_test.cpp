@@ -38,7 +38,7 @@ struct Machine {
                       .application = device.firmware.get()});
             device.firmware->faults().mailbox_delay_ns = mailbox_delay_ns;
         }
-        const config::Reading read = config::read(configuration, "line.ethercat");
+        const config::ReadResult read = config::read(configuration, "line.ethercat");
         EXPECT_EQ(config::to_string(read, "line.ethercat"), "");
         setup = read.buses.at(0).setup;
         line.power_on(0);

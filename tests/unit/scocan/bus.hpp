@@ -53,7 +53,7 @@ struct Seen {
 };
 
 /// One station with its link; keeps what it reports.
-struct Member final : Sink {
+struct Member final : Events {
     Member(const Table& table, const std::string& name, const std::string& bus,
            StationOptions options = {})
         : station(table, table.find(name).value(), options, *this) {
@@ -86,7 +86,7 @@ struct Member final : Sink {
 struct Bus {
     explicit Bus(const char* text = table_text, const char* bus_name = "scocan-test")
         : name(bus_name) {
-        Reading reading = read(text);
+        ReadResult reading = read(text);
         EXPECT_TRUE(reading.good()) << text::errors_text(reading.messages, "table");
         table = std::move(reading.table);
         listener = can::open("sim:" + name, {.bit_rate = table.bit_rate}).link;

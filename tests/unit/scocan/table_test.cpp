@@ -17,7 +17,7 @@ std::string errors(const std::string& text) {
 }
 
 TEST(Table, has_the_defaults_of_the_source_system) {
-    const Reading r = read(std::string(head) + run);
+    const ReadResult r = read(std::string(head) + run);
     ASSERT_TRUE(r.good()) << errors(std::string(head) + run);
     EXPECT_EQ(1'000'000U, r.table.bit_rate);
     EXPECT_EQ(10'000'000, r.table.cycle);
@@ -29,11 +29,11 @@ TEST(Table, has_the_defaults_of_the_source_system) {
 }
 
 TEST(Table, has_the_crc_of_its_normalised_form) {
-    const Reading a = read(std::string(head) + run +
-                           "2 private motor 0x10A\nmessage position 0x10A fields a:s32,b:s32\n");
-    const Reading b = read("# a comment\n" + std::string(head) +
-                           "\n\nmode  0   run # another\n0 sync\n2 private motor 266\nmessage "
-                           "position 0x10A fields a:s32,b:s32 node motor\n");
+    const ReadResult a = read(std::string(head) + run +
+                              "2 private motor 0x10A\nmessage position 0x10A fields a:s32,b:s32\n");
+    const ReadResult b = read("# a comment\n" + std::string(head) +
+                              "\n\nmode  0   run # another\n0 sync\n2 private motor 266\nmessage "
+                              "position 0x10A fields a:s32,b:s32 node motor\n");
     ASSERT_TRUE(a.good() && b.good());
     EXPECT_EQ(normalised(a.table), normalised(b.table));
     EXPECT_EQ(a.table.crc, b.table.crc);
@@ -115,7 +115,7 @@ TEST(Message, that_contradicts_itself_or_the_pins_of_its_components_is_rejected)
 }
 
 TEST(Slot, may_be_shared_by_cycles) {
-    const Reading r =
+    const ReadResult r =
         read(std::string(head) + run +
              "2 private motor 0x10A every 2 offset 0\n2 private ir 0x100 every 4 offset 1\n");
     ASSERT_TRUE(r.good());
@@ -169,7 +169,7 @@ message ultrasound 0x310 node us event 6.4ms
 )";
 
 TEST(Plan, of_the_robot) {
-    const Reading r = read(yair);
+    const ReadResult r = read(yair);
     ASSERT_TRUE(r.good()) << errors(yair);
     const plan::Plan p = plan::plan_of(r.table, 0);
     ASSERT_EQ(6U, p.latencies.size());

@@ -50,7 +50,7 @@ struct Newcomer {
 };
 
 struct Cell : Bed {
-    config::Reading reading = config::read(text);
+    config::ReadResult reading = config::read(text);
     Machine& m;
     Machine& x;
     Machine& y;

@@ -29,7 +29,7 @@ slot 3 2200 2/2 100
 stage2 /etc/station.conf
 )";
 
-std::string said(const config::Reading& r) { return config::to_string(r, "f"); }
+std::string said(const config::ReadResult& r) { return config::to_string(r, "f"); }
 
 TEST(Schedule_of_rtnet, is_read) {
     const auto r = config::read(rtnet);

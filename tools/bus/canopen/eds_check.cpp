@@ -39,7 +39,7 @@ Diagnostic worded(const eds::Message& message, std::uint32_t source) {
 
 /// "motor.eds: not reliable (2 problems); Motor by Maker; 52 objects, 238 entries, 4 RPDOs, 4
 /// TPDOs; 1 warning, 0 notes"
-std::string summary(const std::string& path, const eds::Reading& reading) {
+std::string summary(const std::string& path, const eds::ReadResult& reading) {
     const eds::DeviceDescription& d = *reading.description;
     std::size_t receive = 0;
     std::size_t send = 0;
@@ -73,7 +73,7 @@ int check(const Options& options, const std::string& path) {
     if (!read_file(path, bytes)) {
         return fail(options, fmt::format("cannot read '{}': {}", path, bytes));
     }
-    const eds::Reading reading = eds::read_description(bytes);
+    const eds::ReadResult reading = eds::read_description(bytes);
     Sources sources;
     const std::uint32_t source = sources.add(path, reading.text);
     Diagnostics found;

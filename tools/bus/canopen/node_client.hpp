@@ -10,7 +10,7 @@
 
 namespace hal::tools {
 
-class NodeClient final : private canopen::Events {
+class NodeClient final : private canopen::DeviceEvents {
 public:
     /// `timeout_ns`: of one response; 0: the default.
     explicit NodeClient(const Options&, std::int64_t timeout_ns);

@@ -91,7 +91,7 @@ bool ObjectNames::load(const Options& options, const std::string& file) {
         fail(options, fmt::format("cannot read '{}': {}", file, bytes));
         return false;
     }
-    eds::Reading reading = eds::read_description(bytes);
+    eds::ReadResult reading = eds::read_description(bytes);
     if (!reading.description) {
         fail(options, fmt::format("'{0}' is not a valid device description; for the "
                                   "problems type: hal can eds check {0}",

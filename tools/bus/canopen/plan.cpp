@@ -276,7 +276,8 @@ std::string json_text(const Table& table, const can_timing::Analysis& a) {
 }
 
 /// Reads the configuration and prints its errors and warnings. Returns 0 when it is valid.
-int read_configuration(const Options& options, const std::string& file, config::Reading& reading) {
+int read_configuration(const Options& options, const std::string& file,
+                       config::ReadResult& reading) {
     std::string text;
     if (!config::read_from_disk(file, text)) {
         return fail(options, fmt::format("cannot read '{}': {}", file, text));
@@ -468,7 +469,7 @@ int plan_configuration(const CanopenPlanOptions& options, const std::string& fil
                 "--bitrate is for recordings; for {} write `bitrate = {}` in its section [bus]",
                 file, options.bitrate));
     }
-    config::Reading reading;
+    config::ReadResult reading;
     if (const int status = read_configuration(options, file, reading); status != 0) return status;
     if (const std::string& link = reading.config.link; !can::describe(link).has_bit_rate) {
         return fail(
@@ -524,7 +525,7 @@ int run_canopen_plan(const CanopenPlanOptions& options) {
 int run_canopen_check(const CanopenCheckOptions& options) {
     int status = 0;
     for (const std::string& file : options.words) {
-        config::Reading reading;
+        config::ReadResult reading;
         if (const int one = read_configuration(options, file, reading); one != 0) {
             status = one;
         } else if (!print(network_text(file, reading.config))) {

@@ -5,7 +5,7 @@
 #include <fmt/core.h>
 
 #include "cli/output.hpp"
-#include "ethercat/config/event_words.hpp"
+#include "ethercat/config/event_texts.hpp"
 #include "ethercat/devices/device_words.hpp"
 #include "ethercat/wire/frames.hpp"
 #include "hal/clock.hpp"

@@ -12,6 +12,6 @@ namespace hal::tools {
 /// Reads a configuration. Returns false after printing what is wrong with it; warnings are printed
 /// as well. [setup]
 bool read_bus_file(const Options& options, const std::string& path,
-                   ethercat::config::Reading& reading);
+                   ethercat::config::ReadResult& reading);
 
 }  // namespace hal::tools

@@ -92,7 +92,7 @@ std::string pins_json(const config::Bus& bus) {
 
 }  // namespace
 
-bool read_bus_file(const Options& options, const std::string& path, config::Reading& reading) {
+bool read_bus_file(const Options& options, const std::string& path, config::ReadResult& reading) {
     std::string text;
     if (!config::read_from_disk(path, text)) {
         fail(options, fmt::format("cannot read '{}': {}", path, text));
@@ -199,7 +199,7 @@ int run_ethercat_check(const EthercatCheckOptions& options) {
     int status = 0;
     std::string json;
     for (const std::string& file : options.words) {
-        config::Reading reading;
+        config::ReadResult reading;
         if (!read_bus_file(options, file, reading)) {
             status = 1;
             continue;
@@ -227,7 +227,7 @@ int run_ethercat_plan(const EthercatPlanOptions& options) {
         return fail(options, fmt::format("nothing is expected at '{}'; see: hal help ethercat plan",
                                          options.words[1]));
     }
-    config::Reading reading;
+    config::ReadResult reading;
     if (!read_bus_file(options, options.words[0], reading)) return 1;
     if (!options.svg.empty()) {
         if (reading.buses.size() != 1) {

@@ -21,7 +21,7 @@ int run_ethercat_lcec_conf(const EthercatLcecOptions& options) {
         return fail(options, "exactly one file is required: lcec_conf ethercat-conf.xml");
     }
     StopRequest stop;
-    ethercat::config::Reading reading;
+    ethercat::config::ReadResult reading;
     if (!read_bus_file(options, options.words.front(), reading)) return 1;
     if (!reading.lcec) {
         return fail(options,

@@ -321,7 +321,7 @@ struct OutputFiles {
 std::string write_files(const OutputFiles& files, const std::string& name, const Source& source) {
     constexpr std::int64_t millisecond = 1'000'000;
     const std::string text = config::write(source.link, millisecond, source.slaves);
-    const config::Reading reading = config::read(text, files.configuration);
+    const config::ReadResult reading = config::read(text, files.configuration);
     if (!reading.good() || reading.buses.empty()) {
         return "the slaves describe their process data in a way that no configuration can be "
                "made of: " +

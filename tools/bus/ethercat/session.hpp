@@ -51,8 +51,8 @@ public:
     bool run(ethercat::master::MailboxRequest&);
 
 private:
-    void report(ethercat::master::Event, std::uint32_t, std::int64_t,
-                std::int64_t) noexcept override {}
+    void on_event(ethercat::master::Event, std::uint32_t, std::int64_t,
+                  std::int64_t) noexcept override {}
     void cycle();
     bool until(const std::function<bool()>& done, std::int64_t timeout_ns);
 

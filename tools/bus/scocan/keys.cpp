@@ -2,7 +2,7 @@
 #include "bus/scocan/keys.hpp"
 
 #include "cli/output.hpp"
-#include "fieldbus/scocan/table/table.hpp"
+#include "fieldbus/scocan/config/table.hpp"
 
 namespace hal::tools {
 

@@ -257,7 +257,7 @@ int run_scocan_plan(const ScocanPlanOptions& options) {
     if (!read_regular_file(file, 1'000'000, text)) {
         return fail(options, fmt::format("cannot read '{}': {}", file, text));
     }
-    const Reading reading = scocan::read(text);
+    const ReadResult reading = scocan::read(text);
     const auto code = [](const Report& m) {
         return Code::named(code_of(m.topic)).value_or(Code("scocan-line"));
     };

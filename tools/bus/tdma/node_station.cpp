@@ -68,7 +68,7 @@ std::string TdmaStation::Request::read(const NodeOptions& options) {
     if (!tdma::config::read_from_disk(options.tdma, text)) {
         return fmt::format("cannot read '{}': {}", options.tdma, text);
     }
-    tdma::config::Reading reading = tdma::config::read(text);
+    tdma::config::ReadResult reading = tdma::config::read(text);
     const auto code = [](const tdma::config::Message& m) {
         return Code::named(tdma::config::code_of(m.topic)).value_or(Code("tdma-line"));
     };

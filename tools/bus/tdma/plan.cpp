@@ -159,7 +159,7 @@ int run_tdma_plan(const TdmaPlanOptions& options) {
     if (!config::read_from_disk(file, text)) {
         return fail(options, fmt::format("cannot read '{}': {}", file, text));
     }
-    const config::Reading reading = config::read(text);
+    const config::ReadResult reading = config::read(text);
     const auto code = [](const config::Message& m) {
         return Code::named(config::code_of(m.topic)).value_or(Code("tdma-line"));
     };

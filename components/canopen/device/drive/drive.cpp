@@ -9,16 +9,16 @@
 namespace hal::canopen {
 
 namespace {
-Events nobody;
+DeviceEvents nobody;
 constexpr double max_step = 0.001;
 constexpr Time pause = 100 * millisecond;
 }  // namespace
 
-Drive::Drive(const DriveSettings& settings, const DeviceSettings& device, Events* also)
+Drive::Drive(const DriveSettings& settings, const DeviceSettings& device, DeviceEvents* also)
     : Drive(drive_description(settings), settings, device, also) {}
 
 Drive::Drive(const Description& description, const DriveSettings& settings,
-             const DeviceSettings& device, Events* also)
+             const DeviceSettings& device, DeviceEvents* also)
     : also_(also != nullptr ? *also : nobody), device_(description, device, *this) {
     for (unsigned n = 0; n < std::clamp(settings.axes, 1U, cia402::max_axes); ++n) {
         axes_.push_back(std::make_unique<AxisBinding>(n, settings.axis[n]));

@@ -49,12 +49,13 @@ Description drive_description(const DriveSettings&);
 class AxisBinding;
 
 /// The node. All functions are called by one thread.
-class Drive final : private Events {
+class Drive final : private DeviceEvents {
 public:
     /// Creates the drive. `also` receives the events of the device after the drive. [setup]
-    explicit Drive(const DriveSettings&, const DeviceSettings& = {}, Events* also = nullptr);
+    explicit Drive(const DriveSettings&, const DeviceSettings& = {}, DeviceEvents* also = nullptr);
     /// Creates it with a description derived from drive_description() by adding objects. [setup]
-    Drive(const Description&, const DriveSettings&, const DeviceSettings&, Events* also = nullptr);
+    Drive(const Description&, const DriveSettings&, const DeviceSettings&,
+          DeviceEvents* also = nullptr);
     ~Drive() override;
     Drive(const Drive&) = delete;
     Drive& operator=(const Drive&) = delete;
@@ -110,7 +111,7 @@ private:
 
     // destroyed after the device: they hold the values of its dictionary
     std::vector<std::unique_ptr<AxisBinding>> axes_;
-    Events& also_;
+    DeviceEvents& also_;
     Device device_;
     Time last_ = 0;
 };

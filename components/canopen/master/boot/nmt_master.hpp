@@ -25,10 +25,10 @@
 
 namespace hal::canopen {
 
-/// Notifications of the master, besides Events::on_node() and on_emergency(). All calls come from
-/// poll(), handle() or a command, in the middle of a boot: they must not command the master.
+/// Notifications of the master, besides DeviceEvents::on_node() and on_emergency(). All calls come
+/// from poll(), handle() or a command, in the middle of a boot: they must not command the master.
 /// [realtime]
-class MasterEvents : public Events {
+class MasterEvents : public DeviceEvents {
 public:
     /// NodeStatus::step changed; other members may have changed as well.
     virtual void on_step(const NodeStatus&) noexcept {}
@@ -40,7 +40,7 @@ public:
 };
 
 /// The NMT master. All calls belong to one thread.
-class Master final : private Events {
+class Master final : private DeviceEvents {
 public:
     /// Allocates all memory; queue and events outlive it. Throws std::invalid_argument with the
     /// first of problems_of(). [setup]

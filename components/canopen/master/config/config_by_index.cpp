@@ -97,7 +97,7 @@ private:
 
 }  // namespace
 
-Reading read(const ByIndex& request, const ReadFile& read_file) {
+ReadResult read(const ByIndex& request, const ReadFile& read_file) {
     // Other instances may have nodes on the same bus: they are not reset.
     std::string text =
         "[bus]\nsync = cycle\nreset-at-start = no\nnode-id = " + std::to_string(request.master);

@@ -22,7 +22,7 @@ public:
           descriptions_(read_file,
                         path.find('/') == path.npos ? "" : path.substr(0, path.rfind('/') + 1)) {}
 
-    Reading read() {
+    ReadResult read() {
         Section* const bus = sections_.one("bus");
         if (bus == nullptr) {
             report_.error(Topic::line, {1, 1, 0, 0}, "missing section [bus]",
@@ -115,7 +115,7 @@ private:
     bus::TopicReport<Topic> key_report_{report_};
     bus::SectionFile sections_;
     Descriptions descriptions_;
-    Reading out_;
+    ReadResult out_;
 };
 
 }  // namespace
@@ -139,17 +139,17 @@ MasterSetup MasterConfig::setup() const {
     return out;
 }
 
-bool Reading::good() const { return text::good(messages); }
+bool ReadResult::good() const { return text::good(messages); }
 
 bool read_from_disk(const std::string& path, std::string& bytes) {
     return read_regular_file(path, 16'000'000, bytes);
 }
 
-Reading read(std::string_view text, const std::string& path, const ReadFile& read_file) {
+ReadResult read(std::string_view text, const std::string& path, const ReadFile& read_file) {
     return File(text, path, read_file).read();
 }
 
-std::string to_string(const Reading& reading, const std::string& path) {
+std::string to_string(const ReadResult& reading, const std::string& path) {
     return text::errors_text(reading.messages, path);
 }
 

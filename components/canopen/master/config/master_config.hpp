@@ -164,14 +164,14 @@ struct MasterConfig {
 using ReadFile = std::function<bool(const std::string& path, std::string& bytes)>;
 bool read_from_disk(const std::string& path, std::string& bytes);
 
-struct Reading {
+struct ReadResult {
     MasterConfig config;
     std::vector<Message> messages;  ///< in order of place
     bool good() const;  ///< no error among them
 };
 
 /// Reads a configuration. Relative paths in it start at the folder of `path`.
-Reading read(std::string_view text, const std::string& path, const ReadFile& = read_from_disk);
+ReadResult read(std::string_view text, const std::string& path, const ReadFile& = read_from_disk);
 
 /// Return the keys of [bus], of a node, and the options of a PDO, an SRDO and an object, as tables
 /// in Markdown.
@@ -182,7 +182,7 @@ std::string srdo_reference();
 std::string object_reference();
 
 /// Formats each error as "file:12:7: error: sentence; help", for hosts without a renderer.
-std::string to_string(const Reading&, const std::string& path);
+std::string to_string(const ReadResult&, const std::string& path);
 
 /// The network of a single node of which only object indices are known: `loadrt canopen
 /// inputs=24831 outputs=24675,25600 …`.
@@ -194,6 +194,6 @@ struct ByIndex {
     unsigned master = 0;
 };
 /// Reads it; the messages have no spans.
-Reading read(const ByIndex&, const ReadFile& = read_from_disk);
+ReadResult read(const ByIndex&, const ReadFile& = read_from_disk);
 
 }  // namespace hal::canopen::config

@@ -22,7 +22,7 @@ const eds::DeviceDescription* Descriptions::get(const Word& file, Report& report
     auto& description = known_[file.text];
     std::string text;
     if (!read(file, text, report)) return nullptr;
-    eds::Reading reading = eds::read_description(text);
+    eds::ReadResult reading = eds::read_description(text);
     if (!reading.description) {
         std::string why = "not a device description";
         for (const auto& m : reading.messages) {

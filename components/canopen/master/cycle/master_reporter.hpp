@@ -48,7 +48,7 @@ public:
         reported_.tell({.kind = Event::rejected, .of_link = what});
     }
     void cycle(Time period) noexcept { reported_.tell({.kind = Event::cycle, .period = period}); }
-    void foreign(const RunnerEvents::Foreign& f) noexcept {
+    void foreign(const Events::Foreign& f) noexcept {
         reported_.tell({.of_bus = foreign_event(f), .of_foreign = f});
     }
     void flying(const FlyingMaster& f) noexcept {
@@ -68,7 +68,7 @@ private:
         Time period = 0;
         std::uint8_t master = 0;
         can::Rejected of_link{};
-        RunnerEvents::Foreign of_foreign{};
+        Events::Foreign of_foreign{};
     };
 
     /// A kind is an event of one node; what a device can choose, such as an error code, is the
@@ -127,7 +127,7 @@ private:
         default: add(of.detail, static_cast<int>(e.of_bus)); break;
         }
     }
-    static BusEvent foreign_event(const RunnerEvents::Foreign& f) noexcept {
+    static BusEvent foreign_event(const Events::Foreign& f) noexcept {
         if (f.id == 0) return BusEvent::foreign_nmt;
         if (f.sync) return BusEvent::foreign_sync;
         if (f.id == 0x100) return BusEvent::foreign_time;
@@ -185,7 +185,7 @@ private:
     /// Returns the value of a name in a row.
     std::string value_of(std::string_view name, const Event& e) const {
         const NetworkStatus& network = e.of_network;
-        const RunnerEvents::Foreign& foreign = e.of_foreign;
+        const Events::Foreign& foreign = e.of_foreign;
         if (name == "node") return called(e);
         if (name == "operational") return std::to_string(network.operational);
         if (name == "nodes") return std::to_string(network.nodes);

@@ -19,24 +19,25 @@ namespace hal::canopen {
 class ObjectPins {
 public:
     /// Outputs are written by the one function, inputs read by the other. [setup]
-    ObjectPins(const Function& shows, const Function& takes) : shows_(shows), takes_(takes) {}
+    ObjectPins(const Function& receive, const Function& transmit)
+        : receive_(receive), transmit_(transmit) {}
     /// Declares the pins of a slot. `prefix` ends with a dot or is empty. [setup]
     void declare(Component& component, const std::string& prefix, bool to_node,
                  const config::Object& o, std::size_t slot) {
         const auto add = [&](hal_type type, const std::string& name, const std::string& about,
                              const Bound& bound) {
             if (to_node) {
-                ins_.declare(component, &takes_, type, prefix + name, about, bound,
+                ins_.declare(component, &transmit_, type, prefix + name, about, bound,
                              {.unit = o.unit.c_str()});
             } else {
-                outs_.declare(component, &shows_, type, prefix + name, about, bound,
+                outs_.declare(component, &receive_, type, prefix + name, about, bound,
                               {.unit = o.unit.c_str(), .safe = safe_value(type, o, bound)});
             }
         };
         const bool may_be_invalid = to_node ? o.as == config::PinType::real : is_real(o.type);
         if (may_be_invalid && !invalid_) {
             invalid_ = std::make_unique<Out<std::uint32_t>>(
-                component, shows_, "invalid",
+                component, receive_, "invalid",
                 "real values that are not finite, of nodes and of input pins, counted in each "
                 "cycle: the pin or the object keeps the last finite value");
         }
@@ -61,8 +62,9 @@ public:
         show(runner.slots(), [](const Slot& s) noexcept { return s.has_safe; });
     }
 
-    /// Returns whether an input pin is not finite. [realtime]
-    bool take(Runner& runner) noexcept {
+    /// Copies input pins to the objects of the nodes. Returns whether a pin is not finite: its
+    /// object keeps the last value. [realtime]
+    bool transmit(Runner& runner) noexcept {
         std::uint32_t invalid = 0;
         ins_.each(
             [slots = runner.slots(), &invalid]<class T>(const In<T>& pin, const Bound& b) noexcept {
@@ -80,7 +82,7 @@ public:
                 output = b.codec.encode(pin.get());
             }
         });
-        taken_invalid_.fetch_add(invalid, std::memory_order_relaxed);
+        transmitted_invalid_.fetch_add(invalid, std::memory_order_relaxed);
         return invalid != 0;
     }
 
@@ -111,7 +113,7 @@ private:
             }
             pin = value;
         });
-        invalid += taken_invalid_.exchange(0, std::memory_order_relaxed);
+        invalid += transmitted_invalid_.exchange(0, std::memory_order_relaxed);
         if (invalid_ && invalid != 0) {
             *invalid_ = *invalid_ + invalid;
         }
@@ -160,13 +162,13 @@ private:
         return HAL_TYPE_S32;
     }
 
-    const Function& shows_;
-    const Function& takes_;
+    const Function& receive_;
+    const Function& transmit_;
     AnyIns<Bound> ins_;
     AnyOuts<Bound> outs_;
     std::unique_ptr<Out<std::uint32_t>> invalid_;  // if there are real values
-    // counted by take(), added to the pin by show()
-    std::atomic<std::uint32_t> taken_invalid_{0};
+    // counted by transmit(), added to the pin by show()
+    std::atomic<std::uint32_t> transmitted_invalid_{0};
 };
 
 /// What is known of a node.

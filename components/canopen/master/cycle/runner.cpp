@@ -33,7 +33,7 @@ DeviceSettings device_settings(const config::MasterConfig& config) {
 
 }  // namespace
 
-Runner::Runner(const config::MasterConfig& config, RunnerEvents& events)
+Runner::Runner(const config::MasterConfig& config, Events& events)
     : config_(config),
       events_(events),
       own_(own_node(config)),
@@ -136,7 +136,7 @@ void Runner::add_own_identifiers() {
     }
 }
 
-void Runner::open(can::Link& link) noexcept {
+void Runner::attach(can::Link& link) noexcept {
     link_ = &link;
     bus_state_ = can::State::active;
     had_bus_ = false;
@@ -223,7 +223,7 @@ void Runner::receive(Time now) noexcept {
     if (boots_.exchange(false)) {
         begin(now);
     }
-    take_frames(now);
+    receive_frames(now);
     statistics_ = link_->statistics();
     for (can::Rejected what; link_->rejected(what);) {
         events_.on_rejected(what);
@@ -249,7 +249,7 @@ void Runner::receive(Time now) noexcept {
     }
 }
 
-std::size_t Runner::take_frames(Time now) noexcept {
+std::size_t Runner::receive_frames(Time now) noexcept {
     constexpr std::size_t max = 4096;
     std::array<can::Frame, 32> frames;
     std::size_t taken = 0;
@@ -497,7 +497,7 @@ void Runner::serve_boot(Time now, Time period) noexcept {
     for (Time at = begun, heard = begun; at - begun < period / 4 && at - heard < max_wait;
          at = monotonic_ns()) {
         const Time then = now + (at - begun);
-        if (take_frames(then) == 0) continue;
+        if (receive_frames(then) == 0) continue;
         any = true;
         heard = at;
         master_.poll(then);

@@ -2,7 +2,7 @@
 // A master on a link, a cycle at a time:
 //
 //     Runner runner(config);                  // [setup]
-//     runner.open(*link);
+//     runner.attach(*link);
 //     each cycle:
 //         runner.receive(now);                // what came is in the objects
 //         for (auto& slot : runner.slots()) … // objects to pins, pins to slot.wish
@@ -47,9 +47,9 @@ inline std::uint64_t number_in(const Entry& e) noexcept {
 }
 
 /// What the runner noticed. [realtime]
-class RunnerEvents {
+class Events {
 public:
-    virtual ~RunnerEvents() = default;
+    virtual ~Events() = default;
     virtual void on_step(std::size_t node, const NodeStatus&) noexcept { (void)node; }
     virtual void on_network(const NetworkStatus&) noexcept {}
     virtual void on_emergency(std::size_t node, const Emergency&) noexcept { (void)node; }
@@ -82,12 +82,12 @@ public:
 
 class Runner final : private MasterEvents, private SafetyEvents {
 public:
-    Runner(const config::MasterConfig&, RunnerEvents&);  // [setup] the configuration outlives it
+    Runner(const config::MasterConfig&, Events&);  // [setup] the configuration outlives it
 
     /// The next receive() boots the network. [setup]
-    void open(can::Link& link) noexcept;
+    void attach(can::Link& link) noexcept;
     /// Nothing is received or sent any more. [setup]
-    void close() noexcept { link_ = nullptr; }
+    void detach() noexcept { link_ = nullptr; }
 
     /// [realtime]
     void receive(Time now) noexcept;
@@ -177,7 +177,7 @@ private:
     std::uint64_t safe_image(const OwnSrdo&) const noexcept;
     void boot(Time now) noexcept;
     void note_bus_state(Time now) noexcept;
-    std::size_t take_frames(Time now) noexcept;
+    std::size_t receive_frames(Time now) noexcept;
     void take(const can::Frame&, Time now) noexcept;
     void open_and_close() noexcept;
     bool mandatory_are_configured() const noexcept;
@@ -211,7 +211,7 @@ private:
     }
 
     const config::MasterConfig& config_;
-    RunnerEvents& events_;
+    Events& events_;
     const OwnNode own_;
     Device device_;
     Master master_;

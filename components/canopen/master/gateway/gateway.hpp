@@ -72,7 +72,7 @@ public:
 
 private:
     struct Pending;
-    struct Net final : Events {
+    struct Net final : DeviceEvents {
         Net(Gateway& gateway, unsigned number);
         void on_node(std::uint8_t node, NodeEvent, NmtState, Time) noexcept override;
         void on_emergency(std::uint8_t node, const Emergency&) noexcept override;

@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "fieldbus/can_timing/response_time.hpp"
-#include "fieldbus/scocan/table/table.hpp"
+#include "fieldbus/scocan/config/table.hpp"
 
 namespace hal::scocan::plan {
 

@@ -104,7 +104,7 @@ private:
         can::Frame f;
         f.id = message_.id;
         f.length = static_cast<std::uint8_t>(message_.bytes);
-        if (!fields_.store(f.data)) {
+        if (fields_.transmit(f.data)) {
             *invalid_ = *invalid_ + 1;
         }
         if (data_) {
@@ -151,9 +151,9 @@ public:
         is_fresh_ = false;
     }
 
-    void arrived(const can::Frame& frame, Time begin) noexcept {
+    void receive(const can::Frame& frame, Time begin) noexcept {
         if (frame.length < message_.bytes || frame.remote) return;
-        if (!fields_.load(frame.data)) {
+        if (fields_.show(frame.data)) {
             *invalid_ = *invalid_ + 1;
         }
         if (data_) {
@@ -176,7 +176,6 @@ public:
     }
 
 private:
-
     const Message& message_;
     hal::Out<bool> fresh_;
     hal::Out<std::uint32_t> received_;

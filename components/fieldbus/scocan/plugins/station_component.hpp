@@ -19,7 +19,7 @@
 
 namespace hal::scocan {
 
-class StationComponent : public hal::bus::BusComponent, protected Sink {
+class StationComponent : public hal::bus::BusComponent, protected Events {
 public:
     StationComponent(const hal_host* host, const char* fallback_name,
                      std::initializer_list<Role> roles)
@@ -29,7 +29,7 @@ public:
         const Table& t = arguments_.table;
         texts_.emplace(t, arguments_.own, "setp " + name_ + ".reset TRUE");
         station_ = std::make_unique<Station>(t, arguments_.own, arguments_.options(),
-                                             static_cast<Sink&>(*this));
+                                             static_cast<Events&>(*this));
         reporter_ = std::make_unique<hal::Reporter<EventRecord>>(
             name_, [this](const EventRecord& h) { return texts_->line(h); }, 256,
             &EventTexts::subject);
@@ -150,7 +150,7 @@ protected:
 
     void on_frame(const can::Frame& frame, Time begin) noexcept override {
         if (ReceivedMessage* const m = by_id_[frame.id % identifiers]) {
-            m->arrived(frame, begin);
+            m->receive(frame, begin);
         }
         const bool is_configuration =
             frame.id >= configuration_ids && frame.id <= node_id + arguments_.table.nodes.size();

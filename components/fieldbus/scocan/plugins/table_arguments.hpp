@@ -75,7 +75,7 @@ struct TableArguments {
             file = texts.find(config.get());
             text = texts.read("config", config.get());
         }
-        Reading reading = read(text);
+        ReadResult reading = read(text);
         hal::bus::report(texts, reading.messages, file, text);
         table = std::move(reading.table);
         if (node.get().empty()) {

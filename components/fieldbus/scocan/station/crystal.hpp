@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "fieldbus/scocan/table/table.hpp"
+#include "fieldbus/scocan/config/table.hpp"
 
 namespace hal::scocan {
 

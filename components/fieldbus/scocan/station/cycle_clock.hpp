@@ -7,7 +7,7 @@
 
 #include <cstdint>
 
-#include "fieldbus/scocan/table/table.hpp"
+#include "fieldbus/scocan/config/table.hpp"
 
 namespace hal::scocan {
 

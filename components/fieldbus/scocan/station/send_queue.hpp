@@ -6,7 +6,7 @@
 #include <array>
 #include <cstddef>
 
-#include "fieldbus/scocan/table/table.hpp"
+#include "fieldbus/scocan/config/table.hpp"
 #include "link/can.hpp"
 
 namespace hal::scocan {

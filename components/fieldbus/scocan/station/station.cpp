@@ -22,8 +22,9 @@ const char* to_string(State state) noexcept {
     return names[static_cast<std::size_t>(state)];
 }
 
-Station::Station(const Table& table, std::size_t node, const StationOptions& options, Sink& sink)
-    : core_(table, node, options, sink), wants_windows_(options.windows) {}
+Station::Station(const Table& table, std::size_t node, const StationOptions& options,
+                 Events& events)
+    : core_(table, node, options, events), wants_windows_(options.windows) {}
 
 void Station::attach(can::Link& link) noexcept {
     core_.link = &link;
@@ -72,7 +73,7 @@ void Station::restart(Time now) noexcept {
 void Station::confirm_old_echo(const can::Frame& frame) noexcept {
     SendQueue::Entry sent;
     if (frame.own && core_.queue.confirm(frame, sent)) {
-        core_.sink.on_sent(frame, frame.time_ns);
+        core_.events.on_sent(frame, frame.time_ns);
     }
 }
 
@@ -137,7 +138,7 @@ void Station::accept(const can::Frame& frame) noexcept {
         accept_configuration(frame);
     }
     ++core_.count.received;
-    core_.sink.on_frame(frame, bus_begin);
+    core_.events.on_frame(frame, bus_begin);
 }
 
 void Station::accept_announcement(std::uint32_t slot, const SlotTime& w) noexcept {
@@ -224,7 +225,7 @@ void Station::accept_echo(const can::Frame& frame, const SlotTime& w, Time bus_b
     const bool known = core_.queue.confirm(frame, sent);
     slot_monitor_.check_own(frame, w, bus_begin);
     if (known || frame.id < configuration_ids) {
-        core_.sink.on_sent(frame, bus_begin);
+        core_.events.on_sent(frame, bus_begin);
     }
 }
 

@@ -3,10 +3,10 @@
 // sends in its private slots, in shared slots and in idle private slots of others; the SYNC node,
 // its backups and the monitor are nodes with a further duty, by their role in the table.
 //
-//     Station node(table, *table.find("motor"), {}, sink);        // [setup]
+//     Station node(table, *table.find("motor"), {}, events);        // [setup]
 //     node.attach(link);
 //     ... each cycle of the thread:
-//     node.receive(now);                                          // frames to the sink
+//     node.receive(now);                                          // frames and events, to `events`
 //     node.send(frame, true);                                     // a value for its private slot
 //     node.transmit(now, period);                                 // what begins until the next cycle of the thread
 //
@@ -27,8 +27,8 @@ public:
     /// nodes with more do not fit into a cache.
     static constexpr std::size_t receive_capacity = 512;
 
-    /// The table and the sink outlive it. [setup]
-    Station(const Table&, std::size_t node, const StationOptions&, Sink&);
+    /// The table and the events outlive it. [setup]
+    Station(const Table&, std::size_t node, const StationOptions&, Events&);
 
     void attach(can::Link&) noexcept;  ///< [setup]
     void detach() noexcept { core_.link = nullptr; }  ///< [setup]

@@ -25,7 +25,7 @@ SlotTime StationCore::where(Time local) const noexcept {
     return result;
 }
 
-bool StationCore::emit(const can::Frame& frame, can::Window w) noexcept {
+bool StationCore::send(const can::Frame& frame, can::Window w) noexcept {
     if (!windows) return link->send(frame, now) == can::Sent::queued;
     w.not_before_ns = crystal.bus(w.not_before_ns);
     if (w.last_start_ns != INT64_MAX) {

@@ -29,14 +29,14 @@ struct SlotTime {
 /// The shared part. [realtime]
 struct StationCore {
     StationCore(const Table& slots, std::size_t number, const StationOptions& options,
-                Sink& receiver)
+                Events& receiver)
         : table(slots),
           node(static_cast<std::uint32_t>(number)),
           role(slots.nodes[number].role),
           backup(slots.nodes[number].backup),
           senses(slots.nodes[number].senses),
           single_shot(options.single_shot),
-          sink(receiver),
+          events(receiver),
           crystal(options.crystal),
           clock(slots.cycle, slots.bits(4) + options.crystal.tick) {}
 
@@ -46,7 +46,7 @@ struct StationCore {
     const std::uint32_t backup;
     const bool senses;
     const bool single_shot;
-    Sink& sink;
+    Events& events;
     Crystal crystal;
     CycleClock clock;
     SendQueue queue;
@@ -67,7 +67,7 @@ struct StationCore {
 
     void raise(Event e, std::uint32_t who = no_node, std::uint32_t id = 0,
                Time value = 0) noexcept {
-        sink.on_event(e, who, id, value);
+        events.on_event(e, who, id, value);
     }
     bool is_sync_node() const noexcept { return role == Role::sync || role == Role::backup; }
     /// Queues a frame of the configuration, for shared slots.
@@ -83,7 +83,7 @@ struct StationCore {
     /// Returns the slot at a time of this node.
     SlotTime where(Time local) const noexcept;
     /// Hands a frame to the link; the window is in this node's time.
-    bool emit(const can::Frame&, can::Window) noexcept;
+    bool send(const can::Frame&, can::Window) noexcept;
 };
 
 }  // namespace hal::scocan

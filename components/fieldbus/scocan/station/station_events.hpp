@@ -74,9 +74,9 @@ struct Count {
 };
 
 /// Receives frames of the application and events. [realtime]
-class Sink {
+class Events {
 public:
-    virtual ~Sink() = default;
+    virtual ~Events() = default;
     /// `begin_ns`: start of frame, on the clock of the link.
     virtual void on_frame(const can::Frame&, Time begin_ns) noexcept = 0;
     virtual void on_sent(const can::Frame&, Time /*begin_ns*/) noexcept {}

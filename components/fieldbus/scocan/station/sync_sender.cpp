@@ -79,11 +79,11 @@ void SyncSender::plan(std::uint64_t cycle) noexcept {
     if (!core_.windows) return send_at_once(cycle, begin, at);
     if (primary) {
         const Time window = core_.single_shot ? table.enabled() : table.last_start(2);
-        core_.emit(frame_of(cycle), {.not_before_ns = begin,
+        core_.send(frame_of(cycle), {.not_before_ns = begin,
                                      .last_start_ns = begin + window,
                                      .single_shot = core_.single_shot});
     } else {
-        core_.emit(frame_of(cycle),
+        core_.send(frame_of(cycle),
                    {at, at + table.guard, begin - table.guard, at - table.bits(1), true});
     }
 }
@@ -97,7 +97,7 @@ void SyncSender::send_at_once(std::uint64_t cycle, Time begin, Time at) noexcept
     if (core_.role != Role::sync && came) return;
     if (now > begin + core_.table.last_start(2)) return;
     core_.used = slot;
-    core_.emit(frame_of(cycle), {});
+    core_.send(frame_of(cycle), {});
 }
 
 std::uint64_t SyncSender::sent(Time begin) noexcept {

@@ -131,7 +131,7 @@ bool Transmitter::plan_private(const Use& use, std::uint32_t slot, Time begin) n
     }
     if (e == nullptr) return false;
     const Time window = core_.single_shot ? table.enabled() : table.last_start(e->frame.length);
-    e->in_flight = core_.emit(e->frame, {.not_before_ns = begin,
+    e->in_flight = core_.send(e->frame, {.not_before_ns = begin,
                                          .last_start_ns = begin + window,
                                          .single_shot = core_.single_shot});
     e->until = begin + table.slot() - table.guard;
@@ -146,7 +146,7 @@ void Transmitter::plan_idle(std::uint32_t slot, Time begin) noexcept {
     const Time idle_until = begin + table.idle - table.bits(1);
     if (core_.role == Role::monitor) {
         const Time at = begin + table.idle;
-        core_.emit(announcement(slot),
+        core_.send(announcement(slot),
                    {at, at + table.guard - table.bits(1), idle_from, idle_until, true});
     } else if (core_.senses) {
         plan_shared(begin, {.not_before_ns = begin + table.idle + table.guard,
@@ -163,7 +163,7 @@ void Transmitter::plan_shared(Time begin, const can::Window& window) noexcept {
     while (SendQueue::Entry* e = next_shared(from - begin)) {
         can::Window w = window;
         w.last_start_ns = begin + table.last_start(e->frame.length);
-        e->in_flight = core_.emit(e->frame, w);
+        e->in_flight = core_.send(e->frame, w);
         if (!e->in_flight) return;
         e->until = begin + table.slot() - table.guard;
         from += table.bits(can::frame_bits(e->frame).nominal);
@@ -267,7 +267,7 @@ bool Transmitter::recycles(const SlotTime& w, bool was_idle) const noexcept {
 
 /// Sends a frame that may start now.
 void Transmitter::start(SendQueue::Entry& e, const SlotTime& w) noexcept {
-    e.in_flight = core_.emit(e.frame, {});
+    e.in_flight = core_.send(e.frame, {});
     e.until = core_.begin_of(w.at) + core_.table.slot();
     core_.used = w.at;
 }
@@ -290,7 +290,7 @@ void Transmitter::start_now(Time now) noexcept {
     const bool monitors = core_.role == Role::monitor && !slot.shared();
     if (monitors && !used && was_idle && w.offset >= table.idle) {
         core_.used = w.at;
-        core_.emit(announcement(w.at.slot), {});
+        core_.send(announcement(w.at.slot), {});
         return;
     }
     if (!slot.shared() && !used && !recycles(w, was_idle)) return;

@@ -29,7 +29,7 @@ const StationEntry* Schedule::master() const {
     return found == stations.end() ? nullptr : &*found;
 }
 
-bool Reading::good() const { return text::good(messages); }
+bool ReadResult::good() const { return text::good(messages); }
 
 StationSetup setup_of(const Schedule& s, std::size_t index) {
     const StationEntry& e = s.stations.at(index);
@@ -154,7 +154,7 @@ bool read_from_disk(const std::string& path, std::string& bytes) {
     return false;
 }
 
-std::string to_string(const Reading& reading, const std::string& path) {
+std::string to_string(const ReadResult& reading, const std::string& path) {
     return text::errors_text(reading.messages, path);
 }
 

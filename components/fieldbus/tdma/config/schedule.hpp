@@ -70,14 +70,14 @@ struct Schedule {
     const StationEntry* master() const;
 };
 
-struct Reading {
+struct ReadResult {
     Schedule schedule;
     std::vector<Message> messages;  ///< in order of place
     bool good() const;
 };
 
 /// Reads and checks a schedule.
-Reading read(std::string_view text);
+ReadResult read(std::string_view text);
 /// Return the keys of a segment, and those of a station, as tables in Markdown.
 std::string segment_reference();
 std::string station_reference();
@@ -98,7 +98,7 @@ std::string block_of(const Schedule&, std::size_t index);
 /// Reads a whole file. Returns false and sets `bytes` to the reason.
 bool read_from_disk(const std::string& path, std::string& bytes);
 /// Formats each error as "file:12:7: error: sentence; help", for hosts without a renderer.
-std::string to_string(const Reading&, const std::string& path);
+std::string to_string(const ReadResult&, const std::string& path);
 
 std::string to_string(const Ip&);
 std::optional<Ip> parse_ip(std::string_view);

@@ -24,7 +24,7 @@ public:
     static const bus::KeyTable<Reader>& segment_keys();
     static const bus::KeyTable<Reader>& station_keys();
 
-    Reading read(std::string_view file) {
+    ReadResult read(std::string_view file) {
         text::Lines lines(file);
         while (const auto one = lines.next()) {
             line(text::words_of(*one));
@@ -328,7 +328,7 @@ private:
         }
     }
 
-    Reading out_;
+    ReadResult out_;
     text::Messages<Topic> report_;
     bus::TopicReport<Topic> key_report_{report_};
     StationEntry ignored_;
@@ -411,7 +411,7 @@ const bus::KeyTable<Reader>& Reader::station_keys() {
 
 }  // namespace
 
-Reading read(std::string_view text) { return Reader().read(text); }
+ReadResult read(std::string_view text) { return Reader().read(text); }
 
 std::string segment_reference() { return Reader::segment_keys().reference(); }
 std::string station_reference() { return Reader::station_keys().reference(); }

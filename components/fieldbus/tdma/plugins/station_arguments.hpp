@@ -93,7 +93,7 @@ struct StationArguments {
                                                        ": cannot read '" + file + "': " + text);
             }
         }
-        config::Reading reading = config::read(text);
+        config::ReadResult reading = config::read(text);
         hal::bus::report(texts, reading.messages, file, text);
         schedule = std::move(reading.schedule);
         if (station.get().empty()) {

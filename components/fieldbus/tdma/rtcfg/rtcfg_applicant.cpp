@@ -17,7 +17,7 @@ constexpr std::uint32_t max_rejections = 3;
 constexpr std::uint32_t max_dead = 100;
 
 /// Returns the first error without control characters: the text is untrusted.
-std::string first_error(const config::Reading& reading) {
+std::string first_error(const config::ReadResult& reading) {
     std::string text = config::to_string(reading, "stage 1");
     text.resize(std::min(text.find('\n'), text.size()));
     std::replace_if(text.begin(), text.end(), [](char c) { return c < ' ' || c > '~'; }, '?');
@@ -131,7 +131,7 @@ void Applicant::check(const Offer& offer) {
         return;
     }
     const std::string server = ethernet::to_string(offer.server);
-    config::Reading reading = config::read(text);
+    config::ReadResult reading = config::read(text);
     const bool one = reading.good() && reading.schedule.stations.size() == 1 &&
                      !reading.schedule.stations[0].slots.empty();
     if (!one || all_.size() >= max_accepted) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "ethercat/config/event_words.hpp"
+#include "ethercat/config/event_texts.hpp"
 #include "ethercat/config/event_filter.hpp"
 
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@ std::string words(Event event, std::uint32_t slave, std::int64_t first = 0,
     setup.slaves.resize(2);
     setup.slaves[1].name = "x-axis";
     setup.slaves[1].position = 4;
-    return config::event_words({event, slave, first, second}, setup, "eth:enp3s0", "eth:enp4s0");
+    return config::event_text({event, slave, first, second}, setup, "eth:enp3s0", "eth:enp4s0");
 }
 
 TEST(EthercatEventWords, Refused_state_names_slave_state_code_cause_and_remedy) {
@@ -146,8 +146,8 @@ TEST(EthercatEventWords, Start_up_writes_name_value_and_line) {
     w.line = 14;
     setup.slaves[0].startup.push_back(w);
     const auto of = [&](std::int64_t object, std::int64_t code) {
-        return config::event_words({Event::startup_write_failed, 0, object, code}, setup,
-                                   "eth:enp3s0");
+        return config::event_text({Event::startup_write_failed, 0, object, code}, setup,
+                                  "eth:enp3s0");
     };
     EXPECT_EQ(of(0x606000, 0x06090031),
               "slave 0 rejects 0x08 for 0x6060:0: SDO abort 0x06090031 (value of the "
@@ -265,8 +265,8 @@ TEST(EthercatEventWords, With_LinuxCNCs_format_the_advice_is_in_its_elements) {
     setup.slaves[0].name = "x";
     const auto told = [&](Event event, std::uint32_t slave, std::int64_t first = 0,
                           std::int64_t second = 0) {
-        return config::event_words({event, slave, first, second}, setup, "eth:enp3s0", "",
-                                   config::Format::lcec);
+        return config::event_text({event, slave, first, second}, setup, "eth:enp3s0", "",
+                                  config::Format::lcec);
     };
     EXPECT_EQ(told(Event::wrong_product, 0, 0x402, 0x04020001),
               "slave 0 (x) has the product code 0x00000402, the configuration expects 0x04020001; "

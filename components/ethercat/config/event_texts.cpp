@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "event_words.hpp"
+#include "event_texts.hpp"
 
 #include <algorithm>
 #include <cstdio>
@@ -602,8 +602,8 @@ std::string slave_words(std::uint32_t slave, const master::Setup& setup) {
     return "slave " + where + (s.name.empty() ? "" : " (" + s.name + ")");
 }
 
-std::string event_words(const EventRecord& what, const master::Setup& setup,
-                        const std::string& link, const std::string& backup, Format format) {
+std::string event_text(const EventRecord& what, const master::Setup& setup, const std::string& link,
+                       const std::string& backup, Format format) {
     const Source source{what, setup, link, backup, format == Format::lcec};
     return bus::format(event_rows[static_cast<std::size_t>(what.event)].text, bus::Text::line,
                        [&](std::string_view name) { return value_of(name, source); });

@@ -32,7 +32,7 @@ public:
     static const bus::KeyTable<Reader>& keys();
     static const bus::KeyTable<Reader>& message_keys();
 
-    Reading read(std::string_view file) {
+    ReadResult read(std::string_view file) {
         text::Lines lines(file, "#");
         while (const auto one = lines.next()) {
             line(text::words_of(*one));
@@ -462,7 +462,7 @@ private:
               "write node NAME behind it; no private slot has " + id_text(m.id));
     }
 
-    Reading out_;
+    ReadResult out_;
     text::Messages<Topic> report_;
     bus::TopicReport<Topic> key_report_{report_};
     bus::GivenKeys given_;
@@ -546,6 +546,6 @@ const bus::KeyTable<Reader>& Reader::message_keys() {
 std::string reference() { return Reader::keys().reference(); }
 std::string message_reference() { return Reader::message_keys().reference(); }
 
-Reading read(std::string_view text) { return Reader().read(text); }
+ReadResult read(std::string_view text) { return Reader().read(text); }
 
 }  // namespace hal::scocan

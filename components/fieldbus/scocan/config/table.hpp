@@ -178,14 +178,14 @@ private:
 
 using Report = text::Message<Topic>;
 
-struct Reading {
+struct ReadResult {
     Table table;
     std::vector<Report> messages;  ///< in order of place
     bool good() const { return text::good(messages); }
 };
 
 /// Reads and checks a table.
-Reading read(std::string_view text);
+ReadResult read(std::string_view text);
 /// Return the keys of a table, and those of a message, as tables in Markdown.
 std::string reference();
 std::string message_reference();

@@ -26,9 +26,8 @@ enum class Format : std::uint8_t { ethercat, lcec };
 
 /// Returns the sentence for an event, without a final stop; empty for one that needs none. `link`
 /// and `backup` are the addresses of the ports. [setup]
-std::string event_words(const EventRecord& what, const master::Setup& setup,
-                        const std::string& link, const std::string& backup = {},
-                        Format = Format::ethercat);
+std::string event_text(const EventRecord& what, const master::Setup& setup, const std::string& link,
+                       const std::string& backup = {}, Format = Format::ethercat);
 
 /// Returns the texts of the faults of a bus, of the same table as the sentences; the subjects are
 /// the slaves of the setup. [setup]
