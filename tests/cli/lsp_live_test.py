@@ -55,6 +55,31 @@ class Live(Case):
             "workspace/executeCommand", {"command": "halcyon.apply", "arguments": [self.name]}
         )
 
+    def test_an_ini_file_is_not_sent_as_commands(self):
+        values = self.folder / "values.ini"
+        name = self.client.open(str(values))
+        self.client.change(name, "[X]\nHIGH = 7\nMORE = 40\nunload adder\n")
+        answer = self.client.ask(
+            "workspace/executeCommand", {"command": "halcyon.apply", "arguments": [name]}
+        )
+        self.assertEqual(
+            {
+                "applied": False,
+                "message": "an INI file has values for netlists and no commands: changed ones "
+                "take effect with the next start",
+            },
+            answer,
+        )
+        self.assertEqual("3", self.in_machine("adder.in1"))
+        answer = self.apply(NETLIST.replace("in0 2", "in0 20"))
+        self.assertTrue(answer["applied"])
+        self.assertIn(
+            "values.ini has changed: its values take effect with the next start\n",
+            answer["message"],
+        )
+        self.assertEqual("20", self.in_machine("adder.in0"))
+        self.assertEqual("3", self.in_machine("adder.in1"))
+
     def in_machine(self, name):
         command = "getp" if "." in name else "gets"
         return self.shell(command, name, instance="cell").stdout.strip()

@@ -29,6 +29,8 @@ namespace {
 
 constexpr const char* apply_command = "halcyon.apply";
 
+bool is_ini(const std::string& path) { return path.ends_with(".ini"); }
+
 bool is_netlist(const std::string& path) {
     return path.ends_with(".hal") || !path.starts_with('/');
 }
@@ -418,6 +420,18 @@ bool LanguageFeatures::hints_have_changed() {
     return true;
 }
 
+/// Returns a line for each open INI file that was changed since it was opened.
+std::string LanguageFeatures::changed_ini_files() const {
+    std::string lines;
+    for (const auto& [path, document] : workspace_.documents()) {
+        if (is_ini(path) && document.saved.text() != document.text.text()) {
+            lines += fmt::format("{} has changed: its values take effect with the next start\n",
+                                 path.substr(path.rfind('/') + 1));
+        }
+    }
+    return lines;
+}
+
 /// The command "halcyon.apply" [URI]: sends the changed lines of a document to the machine. Returns
 /// {"applied":…,"message":…}.
 Json LanguageFeatures::execute_command(const Json& params) {
@@ -429,12 +443,18 @@ Json LanguageFeatures::execute_command(const Json& params) {
         throw RequestError(ErrorCode::invalid_params,
                            std::string("write ") + apply_command + " with the URI of a document");
     }
+    if (is_ini(document->path)) {
+        return {{"applied", false},
+                {"message",
+                 "an INI file has values for netlists and no commands: changed ones "
+                 "take effect with the next start"}};
+    }
     const CheckedNetlist* const netlist = workspace_.netlist_of(document->path);
     if (!netlist) throw RequestError(ErrorCode::request_failed, "the document is not a netlist");
     const Ini& ini = netlist->sessions().front()->ini;
     const NetlistChanges changes =
         netlist_changes(document->saved.text(), document->text.text(), ini);
-    std::string message = load_errors(*netlist);
+    std::string message = load_errors(*netlist) + changed_ini_files();
     for (const std::string& reason : changes.not_sent) {
         message += reason + "\n";
     }

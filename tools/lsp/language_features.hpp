@@ -50,6 +50,7 @@ public:
     bool has_hints() const { return !hint_params_.is_null() && !machine_.instance().empty(); }
 
 private:
+    std::string changed_ini_files() const;
     const OpenDocument& document_of(const Json& params) const;
     /// Returns the name under the cursor.
     std::optional<NamedThing> thing_at(const Json& params);
