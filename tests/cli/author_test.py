@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """`hal compile` rejects a component that cannot be loaded or whose declarations contradict each other, with the reason."""
+
 import os
 import re
 import subprocess
@@ -53,13 +54,16 @@ REJECTED = {
         IN.replace('"the input"', '"the input", {.safe = 1.0}') + OUT + RUN + STEP,
         "mine.cpp:6: pin 'in' is an input and has .safe, which applies to outputs only: the value they take when the machine stops",
     ),
-    "a safe value that is no number": (
+    "a safe value NaN": (
         IN + OUT.replace('"the output"', '"the output", {.safe = std::nan("")}') + RUN + STEP,
-        "mine.cpp:7: component 'mine' cannot make 'mine.0': pin 'out' has the safe value nan; it must be a finite number",
+        "mine.cpp:7: component 'mine' cannot make 'mine.0': pin 'out' has the safe value nan; it must be a number",
     ),
-    "an infinite safe value": (
-        IN + OUT.replace('"the output"', '"the output", {.safe = -HUGE_VAL}') + RUN + STEP,
-        "mine.cpp:7: component 'mine' cannot make 'mine.0': pin 'out' has the safe value -inf; it must be a finite number",
+    "an infinite safe value of a finite output": (
+        IN
+        + OUT.replace('"the output"', '"the output", {.safe = -HUGE_VAL, .finite = true}')
+        + RUN
+        + STEP,
+        "mine.cpp:7: component 'mine' cannot make 'mine.0': pin 'out' has the safe value -inf, although it is declared finite",
     ),
     "a finite bool": (
         IN + OUT + '    hal::Out<bool> on{*this, "on", "always", {.finite = true}};\n' + RUN + STEP,

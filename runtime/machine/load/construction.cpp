@@ -43,6 +43,16 @@ bool good_name(std::string_view name) {
                        [](char c) { return valid_in_names[static_cast<unsigned char>(c)]; });
 }
 
+/// Why the safe value of a pin is invalid, or "". Infinity is valid where it means something, as for
+/// an age.
+std::string safe_value_problem(const hal_pin_decl& decl) {
+    if (!(decl.flags & HAL_PIN_SAFE) || decl.type != HAL_TYPE_FLOAT) return "";
+    if (std::isfinite(decl.safe.real)) return "";
+    const std::string value = "has the safe value " + format_value(HAL_TYPE_FLOAT, decl.safe);
+    if (std::isnan(decl.safe.real)) return value + "; it must be a number";
+    return decl.flags & HAL_PIN_FINITE ? value + ", although it is declared finite" : "";
+}
+
 bool take_pin(const hal_host* host, const hal_pin_decl* decl, hal_pin* memory) {
     Construction& c = construction_of(host);
     if (decl->size < HAL_PIN_DECL_SIZE_1_0 || !decl->name || !*decl->name || !memory ||
@@ -56,11 +66,8 @@ bool take_pin(const hal_host* host, const hal_pin_decl* decl, hal_pin* memory) {
         return refuse(c, "it declares a pin with the invalid name '" + std::string(decl->name) +
                              "': letters, digits and - _ . : are valid");
     }
-    const bool has_real_safe = (decl->flags & HAL_PIN_SAFE) && decl->type == HAL_TYPE_FLOAT;
-    if (has_real_safe && !std::isfinite(decl->safe.real)) {
-        return refuse(c, "pin '" + std::string(decl->name) + "' has the safe value " +
-                             format_value(HAL_TYPE_FLOAT, decl->safe) +
-                             "; it must be a finite number");
+    if (const std::string problem = safe_value_problem(*decl); !problem.empty()) {
+        return refuse(c, "pin '" + std::string(decl->name) + "' " + problem);
     }
     auto pin = std::make_unique<Pin>();
     const bool whole = c.whole_pin_names || whole_names(c.instance);
