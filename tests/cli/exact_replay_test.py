@@ -842,14 +842,14 @@ start
     def test_the_values_of_a_journal_are_drawn_without_a_word_about_the_rest(self):
         machine = self.run_journaled(MACHINE, "--values", "*")
         self.wait_for_cycles(10)
-        self.finish(machine)
+        self.end(machine)  # a host without CPU time ends it with a fault
         done = self.run_program("plot", "run.mcap", "sine")
         self.assertEqual((0, "run.svg\n", ""), (done.returncode, done.stdout, done.stderr))
 
     def test_a_journal_without_exact_and_an_unfinished_one_say_what_to_type(self):
         machine = self.run_journaled(MACHINE)
         self.wait_for_cycles(10)
-        self.finish(machine)
+        self.end(machine)
         said = self.bad("replay", "run.mcap")
         self.assertIn(
             "'run.mcap' is a journal; to execute it again, type: hal replay --exact run.mcap;", said

@@ -178,7 +178,7 @@ private:
         if (schema == reader_.schemas().end()) return skip(channel, "it has no schema");
         RowReader row;
         if (!row.open(schema->second, channel)) return skip(channel, row.problem());
-        if (!row.skipped().empty()) {
+        if (!row.skipped().empty() && !is_of_journal(channel)) {
             skipped_.add(topic_text(channel) + ": not read: " + listed(row.skipped()));
         }
         const auto thread = channel.metadata.find("thread");
