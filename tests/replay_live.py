@@ -6,7 +6,8 @@
 MACHINE is a netlist of halfiles, as canopen-axis/axis.hal; without one all of them that start on this computer. --jobs of them run side by side, each for
 the time, while two processes load the CPUs, the machine is suspended for moments, values are set, signals, instances and functions
 are added and removed, a component is reloaded, each bus in memory loses its cable for a moment, and a process is killed: the drive
-of a random netlist, which is started again, or one that the machine has started. The exit status is 0 when no bit of any value
+of a random netlist, which is started again, or one that the machine has started. A random netlist also has links that send in the slots of
+SCoCAN nodes of another thread, a topic of DDS, and a streamer that `hal play` feeds, where the program has these packages. The exit status is 0 when no bit of any value
 differs in any cycle.
 """
 
@@ -55,11 +56,40 @@ loadrt canopen_drive link={bus} id=2
 addf canopen-drive.0.update servo
 start
 """
+# Links of the fast thread send in the slots of nodes of another one.
+TABLE = "bitrate 1M; cycle 10ms; node clock A sync; node a A; node b A; mode 0 run; 0 sync; 2 private a 0x10A"
+SLOTS = f"""loadrt scocan_sync link=sim:slots node=clock table="{TABLE}"
+loadrt scocan link=sim:slots,sim:slots node=a,b table="{TABLE}"
+loadrt can_traffic names=much,little link=scocan:a,scocan:b one_node=1,1 id=0x200,0x300 messages=8,2
+loadrt can_receive names=from-a,from-b link=scocan:b,scocan:a id=0x201,0x301 fields=n:u32,m:u32
+addf scocan-sync.0.receive servo
+addf scocan.0.receive servo
+addf scocan.1.receive servo
+addf much.update fast
+addf little.update fast
+addf from-a.update fast
+addf from-b.update servo
+addf scocan-sync.0.transmit servo
+addf scocan.0.transmit servo
+addf scocan.1.transmit servo
+"""
+TOPIC = """loadrt dds_publish names=said topic=replay/{domain} fields=angle:float rate=0 domain={domain}
+loadrt dds_subscribe names=heard topic=replay/{domain} fields=angle:float domain={domain}
+addf said fast
+addf heard servo
+net played said.angle
+"""
+STREAM = """loadrt streamer depth=500
+loadrt sampler depth=300
+addf streamer.0 servo
+addf sampler.0 servo
+net played streamer.0.pin.0 => sampler.0.pin.0
+"""
 IN_MEMORY = re.compile(r"(?<![\w/])(cane:)?sim:([\w-]+)(/[\w-]+)?")
 ETHERNET = re.compile(r"loadrt (ethercat_segment|tdma)\b|^\[(ethercat|tdma)")
 
 
-def random_netlist(dice):
+def random_netlist(dice, more):
     """Three threads, up to sixty instances, and links between any two of them."""
     lines = [
         "loadrt threads name1=fast period1=500000 supervise1=60s name2=servo period2=1000000 supervise2=60s "
@@ -82,7 +112,7 @@ def random_netlist(dice):
     lines += [
         f"addf {name} {dice.choice(['fast', 'servo', 'servo', 'slow'])}" for name in functions
     ]
-    return "\n".join([*lines, AXIS + "start", ""])
+    return "\n".join([*lines, AXIS + more + "start", ""])
 
 
 def buses_in_memory(folder):
@@ -160,13 +190,17 @@ class Machine:
             self.shell("-k", given=f"unloadrt {component}\n")
 
     def shell(self, *words, given=None):
+        return self.run("shell", *words, given=given)
+
+    def run(self, *words, given=None, timeout=None):
         done = subprocess.run(
-            [self.hal, "shell", *words],
+            [self.hal, *words],
             cwd=self.folder,
             env=self.environment,
             input=given,
             capture_output=True,
             text=True,
+            timeout=timeout,
         )
         return done.stdout
 
@@ -226,12 +260,25 @@ class Machine:
                 self.pull_cables(threads)
             if part == parts * 3 // 4:
                 self.kill_node()
+            self.feed(dice)
             if self.process.poll() is not None:
                 return
             os.kill(self.process.pid, signal.SIGSTOP)
             time.sleep(dice.uniform(0.001, 0.03))
             os.kill(self.process.pid, signal.SIGCONT)
             time.sleep(max(0.0, (end - time.monotonic()) / (parts - part)))
+
+    def feed(self, dice):
+        """Plays some records, and takes some, where the netlist has a streamer and a sampler. Both may be disabled: it waits for 2 s only."""
+        if not (self.folder / "random.hal").exists():
+            return
+        records = "".join(f"{dice.uniform(-5, 5):.4f}\n" for _ in range(dice.randrange(400)))
+        for words, given in (
+            (["play"], records),
+            (["record", "-n", str(dice.randrange(1, 200)), "taken.txt"], None),
+        ):
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self.run(*words, given=given, timeout=2)
 
     @staticmethod
     def setting(dice, pins):
@@ -343,14 +390,31 @@ def prepare_machine(path):
     return prepare
 
 
-def prepare_random(folder, dice):
-    group = f"239.{dice.randrange(1, 255)}.{dice.randrange(256)}.{dice.randrange(1, 255)}"
-    bus = f"udp:{group}%lo:{os.getpid() % 40000 + 20000}"
-    (folder / "random.hal").write_text(random_netlist(dice))
-    (folder / "drive.hal").write_text(DRIVE.format(bus=bus))
-    settings = (HALFILES / "canopen-axis" / "axis.canopen").read_text()
-    (folder / "axis.canopen").write_text(settings.replace("sim:axis", bus))
-    return folder / "random.hal", None
+def further_parts(hal, dice):
+    """The parts of a random netlist whose packages the program has."""
+
+    def has(component):
+        return subprocess.run([hal, "doc", component], capture_output=True).returncode == 0
+
+    parts = [STREAM]
+    if has("scocan"):
+        parts.append(SLOTS)
+    if has("dds_subscribe"):
+        parts.append(TOPIC.format(domain=dice.randrange(1, 200)))
+    return "".join(parts)
+
+
+def prepare_random(hal):
+    def prepare(folder, dice):
+        group = f"239.{dice.randrange(1, 255)}.{dice.randrange(256)}.{dice.randrange(1, 255)}"
+        bus = f"udp:{group}%lo:{os.getpid() % 40000 + 20000}"
+        (folder / "random.hal").write_text(random_netlist(dice, further_parts(hal, dice)))
+        (folder / "drive.hal").write_text(DRIVE.format(bus=bus))
+        settings = (HALFILES / "canopen-axis" / "axis.canopen").read_text()
+        (folder / "axis.canopen").write_text(settings.replace("sim:axis", bus))
+        return folder / "random.hal", None
+
+    return prepare
 
 
 def main():
@@ -374,7 +438,7 @@ def main():
     chosen = [HALFILES / name for name in options.machines]
     machines = chosen or sorted(HALFILES.glob("*/*.hal"))
     todo = [(str(path.relative_to(HALFILES)), prepare_machine(path)) for path in machines]
-    todo += [(f"random {n}", prepare_random) for n in range(options.random)]
+    todo += [(f"random {n}", prepare_random(hal)) for n in range(options.random)]
     with busy_cpus(), concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
         results = list(pool.map(lambda one: run_one(hal, *one, options), todo))
     run = [machine for machine, differs in results if differs is not None]
