@@ -73,11 +73,11 @@ addf scocan-sync.0.transmit servo
 addf scocan.0.transmit servo
 addf scocan.1.transmit servo
 """
-TOPIC = """loadrt dds_publish names=said topic=replay/{domain} fields=angle:float rate=0 domain={domain}
+TOPIC = """loadrt dds_publish names=sent topic=replay/{domain} fields=angle:float rate=0 domain={domain}
 loadrt dds_subscribe names=heard topic=replay/{domain} fields=angle:float domain={domain}
-addf said fast
+addf sent fast
 addf heard servo
-net played said.angle
+net played sent.angle
 """
 STREAM = """loadrt streamer depth=500
 loadrt sampler depth=300
