@@ -47,19 +47,11 @@ void SlaveWrites::sdo(const Line& line, const std::vector<Word>& words) {
         write.protocol = StartupWrite::Protocol::reg;
     }
     const std::string form = words.size() == 3 ? words[2].text : "";
-    if (form == "complete" || form == "raw") {
-        const auto data = esi::hex_bytes(line.value.text);
-        if (!data || data->empty()) {
-            return in_.keys.reject(line,
-                                   "hexadecimal bytes in the order of the wire, as in 01 00 E8 03");
-        }
-        write.complete = form == "complete";
-        write.data = *data;
-    } else if (const auto data = typed_value(line, words, *address)) {
-        write.data = *data;
-    } else {
-        return;
-    }
+    const bool is_raw = form == "complete" || form == "raw";
+    const auto data = is_raw ? raw_value(line) : typed_value(line, words, *address);
+    if (!data) return;
+    write.complete = form == "complete";
+    write.data = *data;
     in_.slave.startup.push_back(std::move(write));
 }
 
@@ -77,6 +69,16 @@ void SlaveWrites::reject_key(const Line& line, const std::string& kind) {
                                    "with a type: sdo 2000:1 u16 = 5";
     in_.report.error(Topic::value, line.key.at,
                      "invalid " + kind + " '" + line.key.text.substr(kind.size() + 1) + "'", help);
+}
+
+/// Returns hexadecimal bytes, or nullopt after reporting the reason.
+std::optional<std::vector<std::uint8_t>> SlaveWrites::raw_value(const Line& line) {
+    auto data = esi::hex_bytes(line.value.text);
+    if (!data || data->empty()) {
+        in_.keys.reject(line, "hexadecimal bytes in the order of the wire, as in 01 00 E8 03");
+        return std::nullopt;
+    }
+    return data;
 }
 
 /// Returns the bytes of the value of `sdo ADDRESS [TYPE] = VALUE`, or nullopt after reporting the

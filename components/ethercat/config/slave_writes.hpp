@@ -21,6 +21,7 @@ private:
     void sdo(const Line& line, const std::vector<Word>& words);
     std::optional<ObjectAddress> address_of(const Word& word, bool is_register);
     void reject_key(const Line& line, const std::string& kind);
+    std::optional<std::vector<std::uint8_t>> raw_value(const Line& line);
     std::optional<std::vector<std::uint8_t>> typed_value(const Line& line,
                                                          const std::vector<Word>& words,
                                                          const ObjectAddress& address);
