@@ -4,6 +4,7 @@
 // clock. The floor is a program that sends the same frame with a plain socket.
 #include "ethercat.hpp"
 
+#include <algorithm>
 #include <cstdlib>
 #include <fmt/core.h>
 #include <stdexcept>
@@ -126,14 +127,13 @@ double thread_cpu_us() {
     return static_cast<double>(t.tv_sec) * 1e6 + static_cast<double>(t.tv_nsec) * 1e-3;
 }
 
-/// Measures exchanges, back to back or one in each millisecond.
+/// An exchange, and what was measured of it.
 template <class Exchange>
-void measure(Times& times, int count, bool paced, Exchange exchange) {
-    std::int64_t due = link::monotonic_ns() + period_ns;
-    for (int i = 0; i < count; ++i, due += period_ns) {
-        if (paced) {
-            sleep_until(due);
-        }
+struct Measured {
+    Times& times;
+    Exchange exchange;
+
+    void once() {
         const double cpu = thread_cpu_us();
         const std::int64_t began = link::monotonic_ns();
         if (!exchange()) {
@@ -142,14 +142,41 @@ void measure(Times& times, int count, bool paced, Exchange exchange) {
         times.wall.push_back(static_cast<double>(link::monotonic_ns() - began) / 1000);
         times.cpu.push_back(thread_cpu_us() - cpu);
     }
+};
+
+/// Measures two kinds of exchange in turn, so that both meet the same noise: back to back in blocks,
+/// or one in each millisecond.
+template <class One, class Other>
+void measure_in_turn(int count, bool paced, Measured<One> one, Measured<Other> other) {
+    const int block = paced ? 1 : 100;
+    std::int64_t due = link::monotonic_ns() + period_ns;
+    const auto run = [&](auto& measured) {
+        for (int n = 0; n < block; ++n, due += period_ns) {
+            if (paced) {
+                sleep_until(due);
+            }
+            measured.once();
+        }
+    };
+    for (int done = 0; done < count; done += block) {
+        run(one);
+        run(other);
+    }
 }
 
-/// Cycle times beside the floor, with a responder that blocks on the same CPU, and the start of the
-/// bus.
-void cycles(const Options& options, Report& report, const std::string& here,
-            const std::string& there) {
+/// Two veth pairs: programs that are measured in turn must not receive each other's frames.
+struct Wire {
+    const char* here;
+    const char* there;
+};
+constexpr Wire wires[] = {{"bench0", "bench1"}, {"bench2", "bench3"}};
+
+/// Cycle times beside the floor, with a responder for each that blocks on the same CPU, and the
+/// start of the bus.
+void cycles(const Options& options, Report& report) {
     constexpr int drives = 50;
-    Slaves slaves(there, line_of(drives, "servo"));
+    const std::string here = wires[0].here, there = wires[0].there;
+    Slaves slaves(there, line_of(drives, "servo")), beside(wires[1].there, "");
     const int last = options.cpu, other = last > 0 ? last - 1 : last,
               rounds = options.quick ? 2 : 5;
     std::vector<double> starts;
@@ -167,12 +194,9 @@ void cycles(const Options& options, Report& report, const std::string& here,
             }
             master.settle(1500);
             slaves.start(Slaves::Mode::null, last);
-            for (const bool paced : {false, true}) {
-                measure(ours[paced], paced ? (options.quick ? 500 : 3000) : 5000, paced,
-                        [&] { return master.exchange(); });
-            }
-            domain = master.master().domain(0);
-            RawSocket raw(here);
+            beside.learn(slaves);
+            beside.start(Slaves::Mode::null, last);
+            RawSocket raw(wires[1].here);
             const std::vector<std::uint8_t> frame = slaves.cyclic_frame();
             frame_bytes = frame.size();
             std::array<std::uint8_t, max_frame_bytes> answer;
@@ -180,10 +204,15 @@ void cycles(const Options& options, Report& report, const std::string& here,
                 raw.send(frame);
                 return raw.receive(answer) != 0;
             };
+            const auto exchange = [&] { return master.exchange(); };
             for (const bool paced : {false, true}) {
-                measure(floor[paced], paced ? (options.quick ? 500 : 3000) : 5000, paced, plain);
+                const int count = paced ? (options.quick ? 500 : 3000) : 5000;
+                measure_in_turn(count, paced, Measured{ours[paced], exchange},
+                                Measured{floor[paced], plain});
             }
+            domain = master.master().domain(0);
         });
+        beside.stop();
         slaves.stop();
         if (round + 1 < rounds) {
             for (std::size_t n = 0; n < slaves.line().size(); ++n) {
@@ -288,14 +317,22 @@ void scan_by_tool(const Options& options, Report& report, const std::string& her
                 .goal = limit(300)});
 }
 
+/// Makes a veth pair.
+bool lay(const Wire& wire) {
+    const std::string command = fmt::format(
+        "ip link add {0} type veth peer name {1} 2>/dev/null && ip link set {0} up && ip link set "
+        "{1} up",
+        wire.here, wire.there);
+    return std::system(command.c_str()) == 0;
+}
+
 void on_veth(const Options& options, Report& report) {
-    if (std::system("ip link add bench0 type veth peer name bench1 2>/dev/null && ip link set "
-                    "bench0 up && ip link set bench1 up") != 0) {
+    if (!std::all_of(std::begin(wires), std::end(wires), lay)) {
         return report.note("no veth pair can be made here (`ip` of iproute2)");
     }
-    cycles(options, report, "bench0", "bench1");
-    reference_clock(options, report, "bench0", "bench1");
-    scan_by_tool(options, report, "bench0", "bench1");
+    cycles(options, report);
+    reference_clock(options, report, wires[0].here, wires[0].there);
+    scan_by_tool(options, report, wires[0].here, wires[0].there);
 }
 
 }  // namespace

@@ -88,18 +88,19 @@ void Slaves::stop() {
 }
 
 void Slaves::emulate() noexcept {
-    std::array<std::uint8_t, max_frame_bytes> buffer;
+    std::array<std::uint8_t, max_frame_bytes> buffer, asked;
     std::int64_t tick = 0;
     while (!stop_.load(std::memory_order_relaxed)) {
         port_->wait(tick);
         while (const auto arrival = port_->receive(link::monotonic_ns())) {
             const std::span frame(buffer.data(), std::min(arrival->bytes.size(), buffer.size()));
             std::memcpy(frame.data(), arrival->bytes.data(), frame.size());
+            std::memcpy(asked.data(), frame.data(), frame.size());
             const std::int64_t now = link::monotonic_ns();
             // the stamp of the kernel
             line_.process(frame, esc::End::primary,
                           std::clamp(arrival->time_ns, now - 1'000'000, now));
-            remember(frame);
+            remember({asked.data(), frame.size()}, frame);
             port_->send(frame, {}, now);
         }
         if (const std::int64_t now = link::monotonic_ns(); now >= tick) {
@@ -120,13 +121,16 @@ void Slaves::return_frames() noexcept {
     }
 }
 
-void Slaves::remember(std::span<std::uint8_t> frame) noexcept {
-    FrameReader reader(frame);
+void Slaves::remember(std::span<std::uint8_t> asked, std::span<std::uint8_t> answered) noexcept {
+    FrameReader questions(asked);
+    FrameReader reader(answered);
     while (const auto d = reader.next()) {
-        if (d->command == Command::lrw && frame.size() >= cyclic_.size()) {
-            cyclic_.assign(frame.begin(), frame.end());
+        const auto question = questions.next();  // each slave has counted up its position
+        const bool is_shorter = cyclic_.empty() || answered.size() < cyclic_.size();
+        if (d->command == Command::lrw && is_shorter) {
+            cyclic_.assign(answered.begin(), answered.end());
         }
-        Answer& a = answers_[{static_cast<std::uint8_t>(d->command), d->address, d->length}];
+        Answer& a = answers_[{static_cast<std::uint8_t>(d->command), question->address, d->length}];
         a.wkc = d->wkc();
         std::memcpy(a.data.data(), d->data, std::min<std::size_t>(d->length, a.data.size()));
     }

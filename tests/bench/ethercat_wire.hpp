@@ -50,9 +50,11 @@ public:
     /// Works on that CPU until stop().
     void start(Mode mode, int cpu);
     void stop();
+    /// Remembers the answers of others. Not while it works.
+    void learn(const Slaves& others) { answers_ = others.answers_; }
     /// Changes the line. Not while it works.
     ethercat::esc::Line& line() { return line_; }
-    /// Returns the longest frame with process data that it saw.
+    /// Returns the shortest frame with process data that it saw: one that carries nothing else.
     const std::vector<std::uint8_t>& cyclic_frame() const { return cyclic_; }
 
 private:
@@ -63,7 +65,7 @@ private:
     };
     void emulate() noexcept;
     void return_frames() noexcept;
-    void remember(std::span<std::uint8_t> frame) noexcept;
+    void remember(std::span<std::uint8_t> asked, std::span<std::uint8_t> answered) noexcept;
     void answer(std::span<std::uint8_t> frame) noexcept;
 
     const std::string interface_;

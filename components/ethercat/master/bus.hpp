@@ -84,9 +84,13 @@ struct Bus {
     /// be stale
     bool settled = false;
     std::uint64_t late_seen = 0;  ///< BusStatus::late in the previous cycle
+    std::uint64_t staleness_seen = 0;  ///< ProcessImage::staleness() in the previous cycle
     bool suspicious = true;  ///< look at the slaves now
     /// the supervision waits; Master wakes it when `suspicious` is set
     bool resting = false;
+    /// the newest look at the line found all slaves in OP, and no task of a slave has started or
+    /// ended that since
+    bool quiet = false;
     int reference = -1;  ///< device with the reference clock
     /// system time of the clocks minus the clock of the cycle
     std::int64_t epoch_ns = 0;
@@ -126,6 +130,7 @@ struct Bus {
     /// Starts a task on the channel of a device: run(d, [&] { return boot(d.channel, bus, d); }).
     template <class Make>
     void run(Device& d, Make&& make) noexcept {
+        quiet = false;
         d.channel.set_now(engine.now_ns());
         d.channel.start(make);
     }
@@ -149,6 +154,7 @@ struct Bus {
     /// Sets whether a start-up brought a slave to OP. It is operational while its process data is
     /// exchanged, too.
     void set_in_op(Device& d, bool is_in_op) noexcept {
+        quiet &= d.in_op == is_in_op;
         d.in_op = is_in_op;
         d.status.operational = d.in_op && !d.stale;
     }
@@ -227,8 +233,9 @@ Task<void> supervise(Channel&, Bus&) noexcept;
 Task<void> watch(Channel&, Bus&) noexcept;
 Task<void> check(Channel&, Bus&, Device&) noexcept;
 void update_working_counters(Bus&) noexcept;  ///< Reports changes of the working counters.
-/// Follows whether the process data of the slaves is exchanged, in each cycle.
-void check_process_data(Bus&) noexcept;
+/// Follows whether the process data of the slaves is exchanged, in each cycle. `may_change`: tasks
+/// may have changed their states.
+void check_process_data(Bus&, bool may_change) noexcept;
 
 // redundancy.cpp
 /// Finds the break of a ring, by how far the primary port reaches.

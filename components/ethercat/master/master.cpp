@@ -2,6 +2,7 @@
 #include "ethercat/master/master.hpp"
 
 #include <optional>
+#include <utility>
 
 #include "ethercat/master/bus.hpp"
 
@@ -39,13 +40,14 @@ void Master::receive(std::int64_t now_ns) noexcept {
     }
     take_clock(bus);
     update_working_counters(bus);
-    check_process_data(bus);
+    const bool tasks_ran = bus.engine.resumed() != std::exchange(resumed_, bus.engine.resumed());
+    const bool was_quiet = std::exchange(was_quiet_, bus.quiet);
+    const bool may_change = tasks_ran && !(was_quiet && bus.quiet);
+    check_process_data(bus, may_change);
     if (bus.suspicious && bus.resting && bus.bus_channel.stage() == Channel::Stage::sleeping) {
         bus.bus_channel.wake();
     }
-    if (const auto resumed = bus.engine.resumed(); resumed != resumed_) {
-        resumed_ = resumed;
-
+    if (may_change) {
         bus.update_status();  // only tasks change states
     }
     if (links_checked_++ % link_check_cycles != 0) return;

@@ -121,6 +121,7 @@ private:
     ethernet::Port* backup_ = nullptr;
     std::uint64_t links_checked_ = 0;
     std::uint64_t resumed_ = 0;
+    bool was_quiet_ = false;  ///< Bus::quiet in the previous cycle
     bool backup_up_ = true;
 };
 

@@ -303,15 +303,15 @@ void ProcessImage::fill(Frame& frame, std::uint8_t index,
 
 bool ProcessImage::matches(const Frame& frame, std::uint8_t index,
                            std::span<const std::uint8_t> answer) const noexcept {
-    if (answer.size() < frame.size) return false;
-    // Ethertype and length, then of each datagram: command, index, address and length; the
-    // circulating bit may have been set on the way.
-    if (std::memcmp(&answer[12], &frame.bytes[12], 4) != 0) return false;
+    // Of each datagram: command, index, address and length; the circulating bit may have been set
+    // on the way, and the last one states whether others follow.
+    const auto length = [](const std::uint8_t* datagram) {
+        return get<std::uint16_t>(datagram + 6) & 0x7ff;
+    };
     const auto same = [&](std::uint16_t at) {
         return answer[at + 1U] == index &&
                std::memcmp(&answer[at + 2U], &frame.bytes[at + 2U], 4) == 0 &&
-               (get<std::uint16_t>(&answer[at + 6U]) & 0x87ff) ==
-                   get<std::uint16_t>(&frame.bytes[at + 6U]);
+               length(&answer[at]) == length(&frame.bytes[at]);
     };
     // The frame that left before may have distributed the time, and the one in this cycle not.
     const bool earlier = left_again(frame, index);
@@ -408,6 +408,7 @@ void ProcessImage::observe(Datagram& d, bool refreshed) noexcept {
 }
 
 void ProcessImage::mark_stale_slaves() noexcept {
+    ++staleness_;
     for (SlaveImage& s : slaves_) {
         s.stale = std::any_of(datagrams().begin(), datagrams().end(),
                               [&](const Datagram& d) { return d.stale && carries(d, s); });

@@ -114,8 +114,8 @@ public:
     /// Copies outputs into a frame that is about to leave, with its index and the time at which it
     /// leaves; nullopt: it distributes no time. [realtime]
     void fill(Frame& frame, std::uint8_t index, std::optional<std::uint64_t> dc_time_ns) noexcept;
-    /// Returns whether `answer` has the datagrams of `frame` as it left with an index: in this
-    /// cycle, or in one before. [realtime]
+    /// Returns whether `answer`, which is not shorter, has the datagrams of `frame` as it left with
+    /// an index: in this cycle, or in one before. Others may follow them. [realtime]
     bool matches(const Frame& frame, std::uint8_t index,
                  std::span<const std::uint8_t> answer) const noexcept;
     /// Returns whether a frame left again since it had an index. [realtime]
@@ -141,6 +141,8 @@ public:
     /// Sums the counters of the datagrams sent since the last call, per domain; a datagram without
     /// answer counts 0. [realtime]
     void settle() noexcept;
+    /// Changes when SlaveImage::stale of a slave may have changed. [realtime]
+    std::uint64_t staleness() const noexcept { return staleness_; }
     /// Returns whether a datagram with data of a slave was answered in its newest exchange: its
     /// working counter is wrong, then. [realtime]
     bool returns(std::size_t slave) const noexcept;
@@ -184,6 +186,7 @@ private:
     std::vector<Datagram> datagrams_;
     std::vector<Frame> frames_;
     std::vector<DomainStatus> domains_;
+    std::uint64_t staleness_ = 0;
     std::size_t datagrams_used_ = 0;
     std::size_t frames_used_ = 0;
     std::array<std::uint8_t, 6> source_;

@@ -257,7 +257,14 @@ struct Look {
     unsigned present = 0;  ///< slaves that are known
     std::uint16_t states = 0;  ///< the OR of their AL status
     bool at_rest = true;  ///< no slave is in start-up
+    bool fine = false;  ///< nothing is to be done
 };
+
+/// Returns whether all known slaves answer, in OP, with their process data.
+static bool all_answer(const Bus& bus, const Look& look) noexcept {
+    return look.count == bus.known && look.states == static_cast<std::uint16_t>(State::op) &&
+           (bus.status.wkc_expected == 0 || bus.status.wkc_state == WkcState::complete);
+}
 
 /// Counts the slaves that answer and those that are known.
 static Task<Look> look_at_line(Channel& c, Bus& bus) noexcept {
@@ -270,6 +277,8 @@ static Task<Look> look_at_line(Channel& c, Bus& bus) noexcept {
     if (bus.engine.redundant()) {
         check_ring(bus, look.count);
     }
+    look.fine = bus.quiet && all_answer(bus, look);
+    if (look.fine) co_return look;
     // On a broken ring the delays are others; they are frozen until it is closed.
     if (bus.clocks_missing() && !bus.status.ring_broken) {
         // a cable may have been closed without any slave lost
@@ -282,6 +291,8 @@ static Task<Look> look_at_line(Channel& c, Bus& bus) noexcept {
         look.present += d.slave.present ? 1 : 0;
         look.at_rest &= !d.slave.present || d.settled;
     }
+    look.fine = look.at_rest && look.present == look.count && all_answer(bus, look);
+    bus.quiet = look.fine && !bus.clocks_missing();
     co_return look;
 }
 
@@ -294,13 +305,6 @@ static void look_for_unknown(Bus& bus, const Look& look) noexcept {
     bus.unknown_reported = false;
     bus.unknown_product = 0;
     bus.report(Event::unknown_gone, 0, 0);
-}
-
-/// Returns whether nothing is to be done: all slaves answer, are known and in OP.
-static bool all_fine(const Bus& bus, const Look& look) noexcept {
-    return look.at_rest && look.count == bus.known && look.present == look.count &&
-           look.states == static_cast<std::uint16_t>(State::op) &&
-           (bus.status.wkc_expected == 0 || bus.status.wkc_state == WkcState::complete);
 }
 
 /// Starts a look at each slave that may need one.
@@ -319,7 +323,7 @@ static void check_slaves(Bus& bus, const Look& look) noexcept {
 }
 
 Task<void> supervise(Channel& c, Bus& bus) noexcept {
-    bus.resting = false;
+    bus.resting = bus.quiet = false;
     co_await start_line(c, bus);
     std::int64_t rediscovered = c.now_ns();
     while (true) {
@@ -331,7 +335,7 @@ Task<void> supervise(Channel& c, Bus& bus) noexcept {
         bus.suspicious = false;
         const Look look = co_await look_at_line(c, bus);
         look_for_unknown(bus, look);
-        if (all_fine(bus, look)) continue;
+        if (look.fine) continue;
         check_slaves(bus, look);
         const bool somebody_waits =
             look.present < look.count || bus.status.responding > look.present;
@@ -670,8 +674,11 @@ static void report_staleness(Bus& bus, Device& d, std::size_t slave, bool late) 
     }
 }
 
-void check_process_data(Bus& bus) noexcept {
+void check_process_data(Bus& bus, bool may_change) noexcept {
     const bool late = bus.status.late != std::exchange(bus.late_seen, bus.status.late);
+    const std::uint64_t staleness = bus.image.staleness();
+    const bool stale_changed = staleness != std::exchange(bus.staleness_seen, staleness);
+    if (!stale_changed && !may_change) return;
     bool changed = false;
     for (std::size_t n = 0; n < bus.setup.slaves.size(); ++n) {
         Device* const d = device_of(bus, n);

@@ -39,6 +39,13 @@ bool controls_slaves(std::span<const std::uint8_t> bytes) noexcept {
     return !only_reads(command) && !of_reading;
 }
 
+/// Returns whether an answer has the Ethertype, type and length of a frame.
+bool has_length_of(std::span<const std::uint8_t> answer,
+                   std::span<const std::uint8_t> frame) noexcept {
+    return std::memcmp(&answer[ethernet_header_bytes - 2], &frame[ethernet_header_bytes - 2], 4) ==
+           0;
+}
+
 /// Returns whether a slave counted in the frame.
 bool passed_a_slave(std::span<const std::uint8_t> bytes) noexcept {
     for (std::size_t at = first_datagram; at + datagram_overhead <= bytes.size();) {
@@ -137,47 +144,74 @@ void WireEngine::transmit(std::int64_t now_ns, bool process_data, bool all_domai
     if (sending_.test_and_set(std::memory_order_acquire)) return;
     sent_after_ns_ = now_ns - cycle_start_ns_;
     now_ns_ = now_ns;
-    std::size_t cyclic_bytes = 0;
+    Allowance allowance{acyclic_frames, wire_bytes_, true};
     if (process_data) {
-        cyclic_bytes = send_process_data(all_domains, dc_time_ns);
+        send_process_data(all_domains, dc_time_ns, allowance);
         ++cycle_;
     }
-    send_acyclic(acyclic_frames, wire_bytes_ - std::min(wire_bytes_, cyclic_bytes));
+    send_acyclic(allowance);
     sending_.clear(std::memory_order_release);
 }
 
-std::size_t WireEngine::send_process_data(bool all_domains, std::uint64_t dc_time_ns) noexcept {
-    // Frames behind the first one leave later than at this time, and slaves before the reference
-    // clock follow it: the first one alone distributes it. While it may be lost, all do.
-    const bool only_first_has_time = clock_.fresh;
-    std::optional<std::uint64_t> time = dc_time_ns;
-    std::size_t bytes = 0;
-    const auto frames = image_.frames();
-    for (std::size_t n = 0; n < frames.size(); ++n) {
-        ProcessImage::Frame& frame = frames[n];
-        const bool is_due = all_domains || frame.every <= 1 || cycle_ % frame.every == 0;
-        if (!is_due) continue;
-        const int index = take_index();
-        if (index < 0) break;
-        image_.fill(frame, static_cast<std::uint8_t>(index), time);
-        if (only_first_has_time) {
-            time.reset();
-        }
-        const std::uint8_t copies = send({frame.bytes.data(), frame.size}, true);
-        bytes += frame.size + frame_overhead;
-        if (copies != 0) {
-            track(index, {.kind = Flight::Kind::cyclic,
-                          .copies = copies,
-                          .place = static_cast<std::uint16_t>(n),
-                          .sent_ns = now_ns_});
-        }
-    }
-    return bytes;
+bool WireEngine::is_due(const ProcessImage::Frame& frame, bool all_domains) const noexcept {
+    return all_domains || frame.every <= 1 || cycle_ % frame.every == 0;
 }
 
-void WireEngine::track(int index, const Flight& flight) noexcept {
-    flights_[static_cast<std::size_t>(index)] = flight;
-    ++in_flight_;
+void WireEngine::send_process_data(bool all_domains, std::uint64_t dc_time_ns,
+                                   Allowance& allowance) noexcept {
+    const auto frames = image_.frames();
+    std::size_t last = 0;
+    for (std::size_t n = 0; n < frames.size(); ++n) {
+        if (is_due(frames[n], all_domains)) {
+            last = n;
+        }
+    }
+    // Frames behind the first one leave later than at this time, and slaves before the reference
+    // clock follow it. They distribute it all the same while the first one may be lost.
+    const bool first_returned = clock_.fresh;
+    std::optional<std::uint64_t> time = dc_time_ns;
+    // While slaves start, so much waits that frames are full anyway.
+    const bool carries = !all_domains;
+    for (std::size_t n = 0; n <= last; ++n) {
+        ProcessImage::Frame& frame = frames[n];
+        if (!is_due(frame, all_domains)) continue;
+        const int index = take_index();
+        if (index < 0) return;
+        image_.fill(frame, static_cast<std::uint8_t>(index), time);
+        if (first_returned) {
+            time.reset();
+        }
+        allowance.bytes -= std::min<std::size_t>(allowance.bytes, frame.size + frame_overhead);
+        Flight& f = flights_[static_cast<std::size_t>(index)];
+        f.place = static_cast<std::uint16_t>(n);
+        if (n == last && carries) {
+            f.carrier = load(frame, static_cast<std::uint8_t>(index), allowance);
+        }
+        send_process_data(f);
+    }
+}
+
+void WireEngine::send_process_data(Flight& f) noexcept {
+    f.sent_ns = now_ns_;
+    if (f.carrier != nullptr) {
+        f.copies = send({f.carrier->bytes.data(), f.carrier->size}, false);
+    } else {
+        const ProcessImage::Frame& frame = image_.frames()[f.place];
+        f.copies = send({frame.bytes.data(), frame.size}, true);
+    }
+    if (f.copies != 0) {
+        f.kind = Flight::Kind::cyclic;
+        ++in_flight_;
+    } else if (f.carrier != nullptr) {
+        await_carried(f);
+        ++in_flight_;
+    }
+}
+
+/// Goes on to wait for the datagrams of channels that a frame carries, without its process data.
+void WireEngine::await_carried(Flight& f) noexcept {
+    f.kind = Flight::Kind::acyclic;
+    f.place = static_cast<std::uint16_t>(f.carrier - acyclic_.data());
 }
 
 void WireEngine::send_now(std::span<const std::uint8_t> frame) noexcept {
@@ -192,36 +226,68 @@ void WireEngine::send_now(std::span<const std::uint8_t> frame) noexcept {
     sending_.clear(std::memory_order_release);
 }
 
-void WireEngine::send_acyclic(unsigned frames, std::size_t bytes) noexcept {
-    bool first = true;
-    for (std::size_t place = 0; place < acyclic_.size() && frames > 0; ++place) {
-        AcyclicFrame& frame = acyclic_[place];
-        if (!frame.free) continue;
+WireEngine::AcyclicFrame* WireEngine::free_frame() noexcept {
+    const auto found = std::find_if(acyclic_.begin(), acyclic_.end(),
+                                    [](const AcyclicFrame& frame) { return frame.free; });
+    return found == acyclic_.end() ? nullptr : &*found;
+}
+
+/// Returns a copy of a frame with process data and waiting datagrams behind it; nullptr: none waits
+/// that has space there.
+WireEngine::AcyclicFrame* WireEngine::load(const ProcessImage::Frame& cyclic, std::uint8_t index,
+                                           Allowance& allowance) noexcept {
+    AcyclicFrame* const carrier = backup_ == nullptr ? free_frame() : nullptr;
+    if (carrier == nullptr || !any_waits()) return nullptr;
+    std::copy_n(cyclic.bytes.begin(), cyclic.size, carrier->bytes.begin());
+    FrameWriter writer = FrameWriter::behind(carrier->bytes, setup_.frame_bytes);
+    bool backup = false;
+    if (!pack(*carrier, writer, index, backup, allowance)) return nullptr;
+    const std::size_t added = carrier->size - cyclic.size;
+    allowance.bytes -= std::min(allowance.bytes, added);
+    allowance.any = false;
+    carrier->free = false;
+    return carrier;
+}
+
+void WireEngine::send_acyclic(Allowance allowance) noexcept {
+    constexpr std::size_t overhead = first_datagram + frame_overhead;
+    for (; allowance.frames > 0; --allowance.frames, allowance.any = false) {
+        AcyclicFrame* const frame = any_waits() ? free_frame() : nullptr;
+        if (frame == nullptr) return;
         const int index = take_index();
         if (index < 0) return;
+        allowance.bytes -= std::min(allowance.bytes, overhead);
+        FrameWriter writer(frame->bytes, primary_->address());
         bool backup = false;
-        if (!pack(frame, static_cast<std::uint8_t>(index), backup, bytes,
-                  std::exchange(first, false))) {
-            return;
-        }
-        bytes -= std::min<std::size_t>(bytes, frame.size + frame_overhead);
-        track(index, {.kind = Flight::Kind::acyclic,
-                      .copies = send({frame.bytes.data(), frame.size}, backup),
-                      .place = static_cast<std::uint16_t>(place),
-                      .sent_ns = now_ns_});
-        frame.free = false;
-        --frames;
+        if (!pack(*frame, writer, static_cast<std::uint8_t>(index), backup, allowance)) return;
+        const std::size_t datagrams = frame->size - first_datagram;
+        allowance.bytes -= std::min(allowance.bytes, datagrams);
+        Flight& f = flights_[static_cast<std::size_t>(index)];
+        f.copies = send({frame->bytes.data(), frame->size}, backup);
+        f.place = static_cast<std::uint16_t>(frame - acyclic_.data());
+        f.sent_ns = now_ns_;
+        f.kind = Flight::Kind::acyclic;
+        ++in_flight_;
+        frame->free = false;
     }
 }
 
-/// Fills a frame of at most `max` bytes on the wire with waiting datagrams, the channels in turn.
-/// The `first` frame of a cycle may be longer for a single datagram. `backup`: whether the frame
-/// leaves on the backup port too. Returns false if nothing is waiting.
-bool WireEngine::pack(AcyclicFrame& frame, std::uint8_t index, bool& backup, std::size_t max,
-                      bool first) noexcept {
-    FrameWriter writer(frame.bytes, primary_->address());
+bool WireEngine::any_waits() const noexcept {
+    for (std::size_t block = 0; block < active_.size(); block += 8) {
+        if (get<std::uint64_t>(&active_[block]) == 0) continue;
+        for (std::size_t n = block; n < std::min(block + 8, channels_.size()); ++n) {
+            if (active_[n] != 0 && channels_[n]->stage() == Channel::Stage::waiting) return true;
+        }
+    }
+    return false;
+}
+
+/// Adds waiting datagrams to a frame, in turn. Those that count positions do not share a frame with
+/// others that leave on both ports.
+bool WireEngine::pack(AcyclicFrame& frame, FrameWriter& writer, std::uint8_t index, bool& backup,
+                      Allowance allowance) noexcept {
     frame.count = 0;
-    std::size_t bytes = first_datagram + frame_overhead;
+    std::size_t bytes = 0;
     const std::size_t channels = channels_.size();
     const std::size_t begin = next_channel_ < channels ? next_channel_ : 0;
     std::size_t next = begin;
@@ -234,8 +300,8 @@ bool WireEngine::pack(AcyclicFrame& frame, std::uint8_t index, bool& backup, std
         const bool on_backup = may_use_backup(channel.command());
         if (!is_alone && on_backup != backup) continue;
         const std::size_t needed = channel.length() + datagram_overhead;
-        if (bytes + needed > max && !(is_alone && first)) continue;
-        if (bytes + needed > setup_.frame_bytes + frame_overhead && !is_alone) continue;
+        if (bytes + needed > allowance.bytes && !(allowance.any && is_alone)) continue;
+        if (first_datagram + bytes + needed > setup_.frame_bytes && !is_alone) continue;
         if (!add_datagram(frame, writer, index, channel)) continue;
         backup = on_backup;
         bytes += needed;
@@ -303,7 +369,7 @@ void WireEngine::arrived(std::span<const std::uint8_t> bytes, unsigned number) n
     Flight& f = flights_[index];
     switch (f.kind) {
     case Flight::Kind::none:
-        if (f.merged) {
+        if (f.merged && is_own(bytes)) {
             ++status_.duplicates;
         } else {
             count_foreign(bytes);
@@ -334,7 +400,11 @@ bool WireEngine::answers(const Flight& f, std::uint8_t index,
                          std::span<const std::uint8_t> bytes) const noexcept {
     const ProcessImage::Frame& frame = image_.frames()[f.place];
     if (backup_ != nullptr && ProcessImage::left_again(frame, index)) return false;
-    return image_.matches(frame, index, bytes);
+    if (f.carrier != nullptr) {
+        return answers(*f.carrier, bytes) && image_.matches(frame, index, bytes);
+    }
+    return bytes.size() >= frame.size && has_length_of(bytes, frame.bytes) &&
+           image_.matches(frame, index, bytes);
 }
 
 void WireEngine::count_late() noexcept {
@@ -342,15 +412,20 @@ void WireEngine::count_late() noexcept {
     missing_ -= missing_ != 0 ? 1 : 0;
 }
 
+/// Returns whether a frame has the address of this master as its source.
+bool WireEngine::is_own(std::span<const std::uint8_t> bytes) const noexcept {
+    // ETG.1000.4: the first slave marks it as locally administered
+    constexpr std::uint8_t set_by_slaves = 0x02;
+    const auto& address = primary_->address();
+    return ((bytes[6] ^ address[0]) & ~set_by_slaves) == 0 &&
+           std::equal(address.begin() + 1, address.end(), bytes.begin() + 7);
+}
+
 /// Counts a frame whose index is free, or that of another frame. As long as own frames are missing,
 /// one with the own address is taken for one of them: it returned after its index was used again.
 /// One with another address that passed no slave comes from a master at the far end.
 void WireEngine::count_foreign(std::span<const std::uint8_t> bytes) noexcept {
-    // ETG.1000.4: the first one marks the source address as locally administered
-    constexpr std::uint8_t set_by_slaves = 0x02;
-    const auto& address = primary_->address();
-    const bool own = ((bytes[6] ^ address[0]) & ~set_by_slaves) == 0 &&
-                     std::equal(address.begin() + 1, address.end(), bytes.begin() + 7);
+    const bool own = is_own(bytes);
     const bool passed = passed_a_slave(bytes);
     if (own && asks_for_safeop(bytes) && unmatched_.load(std::memory_order_relaxed) != 0) {
         unmatched_.fetch_sub(1, std::memory_order_relaxed);
@@ -375,7 +450,15 @@ bool WireEngine::accept(Flight& f, unsigned number) noexcept {
 
 void WireEngine::arrived_cyclic(Flight& f, std::span<const std::uint8_t> bytes) noexcept {
     const ProcessImage::Frame& frame = image_.frames()[f.place];
-    if (backup_ == nullptr) return complete_cyclic(f, bytes.data());
+    if (backup_ == nullptr) {
+        AcyclicFrame* const carrier = f.carrier;
+        complete_cyclic(f, bytes.data());
+        if (carrier != nullptr) {
+            note_reach(*carrier, bytes.data());
+            deliver(*carrier, bytes.data());
+        }
+        return;
+    }
     auto& half = halves_[f.place];
     if (!f.merged) {
         std::memcpy(half.data(), bytes.data(), frame.size);
@@ -404,9 +487,8 @@ void WireEngine::complete_cyclic(Flight& f, const std::uint8_t* answer) noexcept
     --in_flight_;
 }
 
-void WireEngine::arrived_acyclic(Flight& f, std::span<const std::uint8_t> bytes,
-                                 unsigned number) noexcept {
-    AcyclicFrame& frame = acyclic_[f.place];
+/// Returns whether a frame is the answer to datagrams of channels.
+bool WireEngine::answers(const AcyclicFrame& frame, std::span<const std::uint8_t> bytes) noexcept {
     const auto same = [&](const Item& item) {
         const std::size_t at = item.offset - datagram_header_bytes;
         return bytes[at] == frame.bytes[at] && bytes[at + 1] == frame.bytes[at + 1] &&
@@ -414,22 +496,34 @@ void WireEngine::arrived_acyclic(Flight& f, std::span<const std::uint8_t> bytes,
                (get<std::uint16_t>(&bytes[at + 6]) & 0x87ff) ==
                    get<std::uint16_t>(&frame.bytes[at + 6]);
     };
-    if (bytes.size() < frame.size || std::memcmp(&bytes[12], &frame.bytes[12], 4) != 0 ||
-        !std::all_of(frame.items.begin(),
-                     frame.items.begin() + static_cast<std::ptrdiff_t>(frame.count), same)) {
-        count_foreign(bytes);
-        return;
-    }
-    if (!accept(f, number)) return;
-    if (number == 0) {  // how far the primary port reaches
-        for (std::size_t n = 0; n < frame.count; ++n) {
-            if (const std::uint8_t* d = &bytes[frame.items[n].offset];
-                d[-10] == static_cast<std::uint8_t>(Command::brd)) {
-                if (get<std::uint16_t>(d - 6) == registers::al_status) {
-                    primary_wkc_ = get<std::uint16_t>(d + frame.items[n].length);
-                }
-            }
+    return bytes.size() >= frame.size && has_length_of(bytes, frame.bytes) &&
+           std::all_of(frame.items.begin(),
+                       frame.items.begin() + static_cast<std::ptrdiff_t>(frame.count), same);
+}
+
+/// Notes how far the primary port reaches.
+void WireEngine::note_reach(const AcyclicFrame& frame, const std::uint8_t* answer) noexcept {
+    for (std::size_t n = 0; n < frame.count; ++n) {
+        const Item& item = frame.items[n];
+        const std::uint8_t* const data = answer + item.offset;
+        const std::uint8_t* const header = data - datagram_header_bytes;
+        if (header[0] == static_cast<std::uint8_t>(Command::brd) &&
+            get<std::uint16_t>(header + 4) == registers::al_status) {
+            primary_wkc_ = get<std::uint16_t>(data + item.length);
         }
+    }
+}
+
+void WireEngine::arrived_acyclic(Flight& f, std::span<const std::uint8_t> bytes,
+                                 unsigned number) noexcept {
+    AcyclicFrame& frame = acyclic_[f.place];
+    if (!answers(frame, bytes)) return count_foreign(bytes);
+    if (!accept(f, number)) return;
+    if (f.overdue) {
+        ++status_.late;
+    }
+    if (number == 0) {
+        note_reach(frame, bytes.data());
     }
     if (!f.merged) {
         std::memcpy(frame.answer.data(), bytes.data(), frame.size);
@@ -466,6 +560,11 @@ void WireEngine::complete_acyclic(Flight& f) noexcept {
     AcyclicFrame& frame = acyclic_[f.place];
     f.kind = Flight::Kind::none;
     --in_flight_;
+    deliver(frame, frame.answer.data());
+}
+
+/// Continues the tasks whose datagrams a frame has, with their answers.
+void WireEngine::deliver(AcyclicFrame& frame, const std::uint8_t* answer) noexcept {
     for (std::size_t n = 0; n < frame.count; ++n) {
         const Item& item = frame.items[n];
         Channel& c = *item.channel;
@@ -474,17 +573,38 @@ void WireEngine::complete_acyclic(Flight& f) noexcept {
             continue;
         }
         c.set_now(now_ns_);
-        std::memcpy(c.data(), &frame.answer[item.offset], item.length);
+        std::memcpy(c.data(), answer + item.offset, item.length);
         ++resumed_;
-        c.arrive(get<std::uint16_t>(&frame.answer[item.offset + std::size_t{item.length}]));
+        c.arrive(get<std::uint16_t>(answer + item.offset + item.length));
     }
     frame.free = true;
+}
+
+/// Continues the tasks whose datagrams a frame has, without answers.
+void WireEngine::lose(AcyclicFrame& frame) noexcept {
+    frame.free = true;
+    for (std::size_t n = 0; n < frame.count; ++n) {
+        const Item& item = frame.items[n];
+        Channel& c = *item.channel;
+        if (c.stage() != Channel::Stage::sent || c.generation() != item.generation) continue;
+        c.set_now(now_ns_);
+        ++resumed_;
+        c.lose();
+    }
 }
 
 void WireEngine::expire(Flight& f) noexcept {
     f.kind = Flight::Kind::expired;
     --in_flight_;
     missing_ += f.copies;
+}
+
+/// Gives up the process data of a frame. Datagrams of channels have more time than the cycle.
+void WireEngine::give_up_process_data(Flight& f) noexcept {
+    ++status_.lost;
+    if (f.carrier == nullptr) return expire(f);
+    f.overdue = true;
+    await_carried(f);
 }
 
 /// Gives up frames that have been on the way for too long. Of a frame with two copies, one on each
@@ -499,8 +619,7 @@ void WireEngine::expire() noexcept {
             if (f.merged && backup_ != nullptr) {
                 complete_cyclic(f, halves_[f.place].data());
             } else if (now_ns_ - f.sent_ns >= setup_.frame_timeout_ns) {
-                expire(f);
-                ++status_.lost;
+                give_up_process_data(f);
             }
         } else if (f.kind == Flight::Kind::complete) {
             if (now_ns_ - f.sent_ns < setup_.frame_timeout_ns + setup_.cycle_ns) continue;
@@ -508,26 +627,15 @@ void WireEngine::expire() noexcept {
             ++status_.lost;
         } else if (f.kind == Flight::Kind::acyclic &&
                    (f.copies == 0 || now_ns_ - f.sent_ns >= timeout)) {
-            if (f.copies != 0) {
+            if (f.copies != 0 && !f.overdue) {
                 ++status_.lost;
             }
             if (f.merged) {
                 complete_acyclic(f);
                 continue;
             }
-            AcyclicFrame& frame = acyclic_[f.place];
             expire(f);
-            frame.free = true;
-            for (std::size_t n = 0; n < frame.count; ++n) {
-                Channel& c = *frame.items[n].channel;
-                if (c.stage() != Channel::Stage::sent ||
-                    c.generation() != frame.items[n].generation) {
-                    continue;
-                }
-                c.set_now(now_ns_);
-                ++resumed_;
-                c.lose();
-            }
+            lose(acyclic_[f.place]);
         }
     }
 }

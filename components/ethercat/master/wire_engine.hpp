@@ -3,6 +3,10 @@
 // then the datagrams of all channels packed into frames. An answer is matched by its index and what
 // is in flight under it; everything else is counted and ignored.
 //
+// Once all slaves have started, the last frame with process data carries as many datagrams of
+// channels as it has space for: a frame of their own would double what a cycle costs. With a backup
+// port it carries none, since the halves of a ring are joined in another way there.
+//
 // With a backup port each frame leaves on both ports. On a closed ring the copy of the primary port
 // passes every slave and arrives at the backup port, the other one arrives unprocessed; on a broken
 // ring each returns where it left, having passed its half. Either way two copies arrive, one on
@@ -102,33 +106,51 @@ private:
         std::uint8_t arrivals = 0;  ///< bit mask of the ports at which one arrived
         bool merged = false;  ///< one copy arrived
         std::uint16_t place = 0;  ///< frame of the image, or of acyclic_
+        /// with process data: the frame of acyclic_ that left in its place, with datagrams of
+        /// channels behind it
+        AcyclicFrame* carrier = nullptr;
+        bool overdue = false;  ///< a carrier whose process data was given up
         std::int64_t sent_ns = 0;
+    };
+    /// What the channels may send in a cycle.
+    struct Allowance {
+        unsigned frames = 0;
+        std::size_t bytes = 0;  ///< on the wire
+        bool any = false;  ///< one datagram may be longer: none was sent yet
     };
 
     void receive_frames(ethernet::Port& port, unsigned number) noexcept;
     void arrived(std::span<const std::uint8_t> bytes, unsigned number) noexcept;
     bool answers(const Flight&, std::uint8_t index,
                  std::span<const std::uint8_t> bytes) const noexcept;
+    static bool answers(const AcyclicFrame&, std::span<const std::uint8_t> bytes) noexcept;
     void arrived_cyclic(Flight&, std::span<const std::uint8_t> bytes) noexcept;
     void arrived_acyclic(Flight&, std::span<const std::uint8_t> bytes, unsigned number) noexcept;
+    bool is_own(std::span<const std::uint8_t> bytes) const noexcept;
     void count_foreign(std::span<const std::uint8_t> bytes) noexcept;
     bool accept(Flight&, unsigned number) noexcept;
     void complete_cyclic(Flight&, const std::uint8_t* answer) noexcept;
     void complete_acyclic(Flight&) noexcept;
     void merge_acyclic(AcyclicFrame&, const std::uint8_t* second) noexcept;
+    void note_reach(const AcyclicFrame&, const std::uint8_t* answer) noexcept;
+    void deliver(AcyclicFrame&, const std::uint8_t* answer) noexcept;
+    void lose(AcyclicFrame&) noexcept;
     void count_late() noexcept;
     void expire() noexcept;
     void expire(Flight&) noexcept;
+    void give_up_process_data(Flight&) noexcept;
     void wake() noexcept;
-    /// Sends the frames of the process data that are due. Returns their bytes on the wire.
-    std::size_t send_process_data(bool all_domains, std::uint64_t dc_time_ns) noexcept;
-    void send_acyclic(unsigned frames, std::size_t bytes) noexcept;
-    /// Keeps a sent frame until its copies arrive or expire.
-    void track(int index, const Flight& flight) noexcept;
+    bool is_due(const ProcessImage::Frame&, bool all_domains) const noexcept;
+    void send_process_data(bool all_domains, std::uint64_t dc_time_ns, Allowance&) noexcept;
+    void send_process_data(Flight&) noexcept;
+    void await_carried(Flight&) noexcept;
+    void send_acyclic(Allowance) noexcept;
+    bool any_waits() const noexcept;
+    AcyclicFrame* free_frame() noexcept;
+    AcyclicFrame* load(const ProcessImage::Frame&, std::uint8_t index, Allowance&) noexcept;
+    bool pack(AcyclicFrame&, FrameWriter&, std::uint8_t index, bool& backup, Allowance) noexcept;
     bool may_use_backup(Command command) const noexcept;
     bool add_datagram(AcyclicFrame&, FrameWriter&, std::uint8_t index, Channel&) noexcept;
-    bool pack(AcyclicFrame&, std::uint8_t index, bool& backup, std::size_t max,
-              bool first) noexcept;
     std::uint8_t send(std::span<const std::uint8_t> frame, bool backup) noexcept;
     int take_index() noexcept;
 

@@ -78,6 +78,20 @@ FrameWriter::FrameWriter(std::span<std::uint8_t, max_frame_bytes> buffer,
     buffer_[13] = ethertype & 0xff;
 }
 
+FrameWriter FrameWriter::behind(std::span<std::uint8_t, max_frame_bytes> buffer,
+                                std::size_t max) noexcept {
+    std::array<std::uint8_t, 6> source;
+    std::copy_n(buffer.begin() + 6, source.size(), source.begin());
+    FrameWriter writer(buffer, source, max);
+    FrameReader written(buffer);
+    while (const auto datagram = written.next()) {
+        const std::uint8_t* const end = datagram->data + datagram->length + wkc_bytes;
+        writer.used_ = static_cast<std::size_t>(end - buffer.data());
+        writer.last_ = datagram->header;
+    }
+    return writer;
+}
+
 std::size_t FrameWriter::space() const noexcept {
     constexpr std::size_t overhead = datagram_header_bytes + wkc_bytes;
     return max_ > used_ + overhead ? max_ - used_ - overhead : 0;

@@ -105,6 +105,9 @@ public:
     FrameWriter(std::span<std::uint8_t, max_frame_bytes> buffer,
                 const std::array<std::uint8_t, 6>& source,
                 std::size_t max = max_frame_bytes) noexcept;
+    /// Returns a writer that continues the complete frame in a buffer, behind its datagrams.
+    static FrameWriter behind(std::span<std::uint8_t, max_frame_bytes> buffer,
+                              std::size_t max = max_frame_bytes) noexcept;
     /// Adds a datagram with zeroed data and WKC 0. Returns its data, or nullptr if the frame has no
     /// space left.
     std::uint8_t* add(Command command, std::uint8_t index, std::uint32_t address,

@@ -50,6 +50,27 @@ TEST(EthercatFrame, Datagram_beyond_the_frame_is_not_read) {
     }
 }
 
+TEST(EthercatFrame, Writer_continues_a_complete_frame) {
+    std::array<std::uint8_t, max_frame_bytes> buffer{};
+    FrameWriter first(buffer, std::array<std::uint8_t, 6>{2, 1, 2, 3, 4, 5});
+    first.add(Command::lrw, 7, 0x10000, 3)[1] = 9;
+    ASSERT_EQ(first.finish().size(), 60U);
+    FrameWriter more = FrameWriter::behind(buffer, 100);
+    ASSERT_NE(more.add(Command::fprd, 7, at_station(0x1001, registers::al_status), 6), nullptr);
+    EXPECT_EQ(more.add(Command::brd, 7, 0, 60), nullptr) << "100 bytes are full";
+    const auto frame = more.finish();
+    FrameReader reader({buffer.data(), frame.size()});
+    const auto a = reader.next();
+    const auto b = reader.next();
+    ASSERT_TRUE(a && b);
+    EXPECT_EQ(a->data[1], 9);
+    EXPECT_TRUE(a->more);
+    EXPECT_EQ(b->command, Command::fprd);
+    EXPECT_EQ(b->register_address(), registers::al_status);
+    EXPECT_FALSE(b->more);
+    EXPECT_FALSE(reader.malformed());
+}
+
 using namespace hal::ethercat::master;
 using hal::Task;
 

@@ -258,6 +258,36 @@ TEST(EthercatMaster, A_port_without_link_is_reported_and_no_missing_slaves) {
     EXPECT_EQ(w.log.count(Event::link_restored), 1U);
 }
 
+TEST(EthercatMaster, A_settled_bus_needs_one_frame_in_each_cycle) {
+    World w;
+    for (unsigned n = 0; n < 3; ++n) {
+        w.add(0x100 + n);
+    }
+    w.begin(drives(3));
+    ASSERT_TRUE(w.operational()) << w.log.text();
+    w.run(100);
+    const std::uint64_t before = w.primary.sent;
+    w.run(3000);
+    EXPECT_EQ(w.primary.sent - before, 3000U) << "the supervision's datagrams share that frame";
+    EXPECT_EQ(w.master->cycles_incomplete(), 0U);
+}
+
+TEST(EthercatMaster, A_lost_frame_loses_nothing_that_it_carried_for_the_supervision) {
+    World w;
+    w.add(0x100);
+    w.begin(drives(1));
+    ASSERT_TRUE(w.operational()) << w.log.text();
+    w.primary.lose_every = 3;
+    w.run(3000);
+    w.primary.lose_every = 0;
+    w.run(100);
+    EXPECT_TRUE(w.master->status().operational) << w.log.text();
+    EXPECT_EQ(w.log.count(Event::slave_lost), 0U) << w.log.text();
+    EXPECT_EQ(w.master->status().late, 0U);
+    EXPECT_EQ(w.master->status().foreign, 0U);
+    EXPECT_NEAR(static_cast<double>(w.master->status().lost), 1000.0, 20.0);
+}
+
 TEST(EthercatMaster, Two_masters_that_begin_together_notice_each_other) {
     World w;
     w.add(0x100);
