@@ -54,10 +54,20 @@ void command_journal(Context& context) {
             "this machine has no journal: it begins with the machine", "",
             "write the line into a netlist that hal run or hal linuxcnc is given, "
             "or type: hal run --journal FILE.mcap");
-    } else if (!context.shell.note_journal(line->file)) {
+        return;
+    }
+    const Sources& sources = context.session.sources;
+    const std::string origin = sources.location(context.command.span, false);
+    const std::string other = context.shell.note_journal(*line, origin);
+    if (other.empty()) return;
+    if (other.starts_with("--")) {
         context.diagnostics.warning("ignored-option", context.command.span,
-                                    "a machine has one journal, and an earlier line names another "
-                                    "file: this line is ignored",
+                                    "a machine has one journal, and the command line names it by " +
+                                        other + ": this line is ignored");
+    } else {
+        context.diagnostics.warning("ignored-option", context.command.span,
+                                    "a machine has one journal, and that of " + other +
+                                        " is another one: this line is ignored",
                                     "", "remove one of the two lines");
     }
 }

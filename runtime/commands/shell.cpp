@@ -69,11 +69,20 @@ void Shell::look_up(std::function<std::optional<std::string>(const std::string&)
     state_->variable = std::move(variable);
 }
 
-bool Shell::note_journal(const std::string& file) {
-    if (state_->journal->empty()) {
-        *state_->journal = file;
+std::string Shell::note_journal(const JournalLine& journal, const std::string& origin) {
+    State::NotedJournal& noted = *state_->journal;
+    if (noted.origin.empty()) {
+        noted = {journal, origin};
     }
-    return *state_->journal == file;
+    const bool is_same = absolute_path(noted.journal.file) == absolute_path(journal.file) &&
+                         noted.journal.keep_ns == journal.keep_ns;
+    return is_same ? "" : noted.origin;
+}
+
+void Shell::note_journal_option(const std::string& file, std::int64_t keep_ns) {
+    if (!file.empty()) {
+        note_journal({file, keep_ns}, "--journal " + file);
+    }
 }
 
 void Shell::add_latencies(std::vector<std::string> lines) {

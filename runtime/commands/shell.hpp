@@ -23,6 +23,7 @@ class Ini;
 class Session;
 class Sources;
 struct Command;
+struct JournalLine;
 
 /// Where the text of commands goes.
 class Output {
@@ -161,8 +162,12 @@ public:
     /// of the socket brings its own.
     void look_in(std::optional<Ini> ini);
 
-    /// Notes the file of a line `journal`. Returns false when an earlier line names another one.
-    bool note_journal(const std::string& file);
+    /// Notes the journal that the machine writes. `origin`: where it is named. Returns the origin of
+    /// another one that was noted before, or "".
+    std::string note_journal(const JournalLine& journal, const std::string& origin);
+    /// Notes the journal that `hal run --journal` names: a line `journal` that names another one is
+    /// ignored. Does nothing with an empty name.
+    void note_journal_option(const std::string& file, std::int64_t keep_ns);
     /// Sets the lines that latencies() of this shell and its siblings adds: about signals between
     /// the machines of a cell.
     void add_latencies(std::vector<std::string> lines);

@@ -11,6 +11,7 @@
 
 #include "commands/linuxcnc_check.hpp"
 #include "commands/shell.hpp"
+#include "netlist/journal_line.hpp"
 #include "netlist/netlist.hpp"
 
 namespace hal {
@@ -28,9 +29,12 @@ struct Shell::State {
     /// and read with its lock held.
     std::shared_ptr<std::vector<std::string>> latencies =
         std::make_shared<std::vector<std::string>>();
-    /// The file that the first line `journal` of the netlists names, shared by all shells of the
-    /// session as well.
-    std::shared_ptr<std::string> journal = std::make_shared<std::string>();
+    struct NotedJournal {
+        JournalLine journal;
+        std::string origin;  ///< where it is named; empty: nowhere yet
+    };
+    /// What Shell::note_journal() has noted, shared by all shells of the session as well.
+    std::shared_ptr<NotedJournal> journal = std::make_shared<NotedJournal>();
     ScriptRunner run_script = {};
     LinuxcncCheck linuxcnc_check = {};  ///< `hal check --linuxcnc`
     /// With TWOPASS, while the loads are gathered: one `loadrt` for each LinuxCNC module, which is

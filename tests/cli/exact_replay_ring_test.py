@@ -304,8 +304,8 @@ start
         two = "journal own.mcap\njournal own.mcap\njournal other.mcap\n"
         text = self.run_program("check", self.write("b.hal", two)).stderr
         self.assertEqual(
-            "b.hal:3:1: warning: a machine has one journal, and an earlier line names another "
-            "file: this line is ignored [ignored-option]\n"
+            "b.hal:3:1: warning: a machine has one journal, and that of b.hal:1 is another one: "
+            "this line is ignored [ignored-option]\n"
             "    3 | journal other.mcap\n      | ^^^^^^^^^^^^^^^^^^\n"
             "      = help: remove one of the two lines\nb.hal: no errors\n",
             text.replace(str(self.folder) + "/", ""),
@@ -317,6 +317,24 @@ start
             ("journal save", "journal save needs a file"),
         ]:
             self.assertIn(problem, self.bad("check", self.write("b.hal", line + "\n")))
+
+    def test_a_line_journal_beside_another_one_of_the_command_line_is_ignored_with_a_warning(self):
+        self.write("two.hal", "journal own.mcap\n" + HEAP)
+        self.write("two.ini", "[HAL]\nTWOPASS = on\nHALFILE = two.hal\n")
+        for netlist in ("two.hal", "two.ini"):
+            done = self.run_program("run", netlist, "--for", "50ms", "--journal", "other.mcap")
+            self.assertEqual(0, done.returncode, done.stderr)
+            warnings = re.findall("two.hal:1:1: warning: .*", done.stderr)
+            self.assertEqual(
+                [
+                    "two.hal:1:1: warning: a machine has one journal, and the command line names it "
+                    "by --journal other.mcap: this line is ignored [ignored-option]"
+                ],
+                warnings,
+            )
+            self.assertFalse((self.folder / "own.mcap").exists())
+        done = self.run_program("run", "two.hal", "--for", "50ms", "--journal", "./own.mcap")
+        self.assertNotIn("warning", done.stderr)
 
     def test_what_cannot_be_saved_is_named(self):
         for words, problem in [

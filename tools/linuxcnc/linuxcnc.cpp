@@ -36,6 +36,7 @@ int launch(const LinuxcncOptions& options, const Configuration& configuration, M
     HostedMachine machine(hosted, own_name(options), false,
                           {.sink = journal ? &journal->sink() : nullptr});
     ::setenv("PATH", path.c_str(), 1);  // a wrapper in the configuration's bin/ has precedence
+    machine.shell.note_journal_option(options.journal, options.keep_ns);
     if (!machine.serve(true)) return 1;
     if (journal) {
         journal->begin(machine);

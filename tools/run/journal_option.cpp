@@ -88,6 +88,7 @@ void add_journal_of_netlists(RunOptions& options) {
         const auto line = path.ends_with(".ini") ? search.find_in_ini(path) : search.find(path, "");
         if (!line) continue;
         options.journal = line->file;
+        options.is_of_netlist = true;
         options.keep_ns = options.keep_ns > 0 ? options.keep_ns : line->keep_ns;
         return;
     }

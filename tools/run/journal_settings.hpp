@@ -13,6 +13,7 @@ namespace hal::tools {
 struct JournalSettings {
     std::string journal;       ///< file
     std::int64_t keep_ns = 0;  ///< of the journal; 0: all of it
+    bool is_of_netlist = false;  ///< `journal` was set by a line of a netlist, not by --journal
     std::vector<std::string> values;  ///< to be recorded with it: names and patterns
 
     void declare_journal(OptionSet& set) {

@@ -151,6 +151,9 @@ int run_machine(const RunOptions& options, RunJournal* journal) {
     HostedMachine machine(options, own_name(options), false,
                           {.sink = journal ? &journal->sink() : nullptr});
     machine.stop_at_once();
+    if (!options.is_of_netlist) {
+        machine.shell.note_journal_option(options.journal, options.keep_ns);
+    }
     if (!machine.serve(true)) return 1;
     return options.classic ? run_classic(machine, options)
                            : run_plain(machine, options, *nodes, service, journal);
