@@ -21,10 +21,12 @@ FaultBoard& board_of(const hal_faults* shared) noexcept {
 FaultBoard::FaultBoard() noexcept {
     shared.faults.size = sizeof shared;
     shared.faults.clear = [](const hal_faults* f) { board_of(f).clear(); };
-    shared.faults.raise = [](const hal_faults*, const void* self, const char* reason,
+    shared.faults.raise = [](const hal_faults* f, const void* self, const char* reason,
                              double detail) {
         if (Core* const core = Core::current()) {
             core->raise({HAL_FAULT_COMPONENT, 0, core->cycle_number(), 0, detail, reason, self});
+        } else {
+            board_of(f).count_outside_cycle();
         }
     };
     shared.lasts = [](const hal_faults* f, const void* self, const char* reason, bool lasts) {

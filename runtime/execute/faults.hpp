@@ -178,6 +178,9 @@ struct FaultBoard {
     void end(const void* owner, const void* key) noexcept;
     /// All conditions are over whose owner is at first <= owner < last. [any]
     void end_all(const void* first, const void* last) noexcept;
+    /// Counts a fault that was raised outside of a cycle, as in `stop`, where no thread has a
+    /// record for it. [any]
+    void count_outside_cycle() noexcept { outside_cycle.fetch_add(1, std::memory_order_relaxed); }
     /// [any]
     bool lasts(const void* owner, const void* key) const noexcept;
 
@@ -188,6 +191,7 @@ struct FaultBoard {
         std::atomic<const void*> owner{nullptr}, key{nullptr};
     };
     std::array<Lasting, max_lasting> lasting{};
+    std::atomic<std::uint64_t> outside_cycle{0};  ///< never cleared
     std::atomic<std::size_t> lasting_end{0};  ///< those behind it were never used
 };
 

@@ -366,6 +366,8 @@ class FrameGuardian(GuardedMachine, Case):
             "not as often as declared); stop the drives by other means\n",
             errors,
         )
+        self.assertIn("'guard' raised a fault while it stopped", errors)
+        self.assertEqual(1, machine.returncode)
 
     def test_a_thread_that_fails_before_it_comes_to_the_function_sends_them_again(self):
         self.environment["HALCYON_PLUGIN_PATH"] = str(Path(PLUGINS).parent / "plugins")

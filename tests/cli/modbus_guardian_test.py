@@ -171,6 +171,42 @@ class Guardian(GuardedMachine, Case):
                 self.assertIn(STOP, [frame for _, frame in self.drive.writes[begin:]])
                 self.end(machine)
 
+    def ends_with(self, status, machine):
+        """Ends the machine; what it printed about a component that could not stop."""
+        printed = "".join(self.end(machine))
+        self.assertEqual(status, machine.returncode, printed)
+        return re.findall("'modbus.0' raised a fault while it stopped: .*", printed)
+
+    def test_an_end_that_a_drive_does_not_acknowledge_has_status_1(self):
+        machine = self.run_guarded()
+        self.drive.answers = False
+        self.assertEqual(1, len(self.ends_with(1, machine)))
+
+    def test_an_end_behind_an_unacknowledged_e_stop_has_status_1(self):
+        machine = self.run_guarded()
+        self.drive.answers = False
+        self.say("setp", "modbus.0.estop", "TRUE")
+        wait_until(
+            lambda: "did not acknowledge its stop telegrams" in self.say("show", "fault"),
+            "the stop is unconfirmed",
+        )
+        self.say("exit")
+        self.assertEqual(1, len(self.ends_with(1, machine)))
+
+    def test_an_unload_that_a_drive_does_not_acknowledge_is_not_forgotten(self):
+        machine = self.run_guarded()
+        self.drive.answers = False
+        for function in ("receive", "transmit"):
+            self.shell("delf", f"modbus.0.{function}", "servo")
+        self.shell("unloadrt", "modbus")
+        self.assertEqual(1, len(self.ends_with(1, machine)))
+
+    def test_an_end_that_all_drives_acknowledge_has_status_0(self):
+        self.assertEqual([], self.ends_with(0, self.run_guarded()))
+        classic = self.start("run", "--for", "300ms", self.netlist)
+        classic.wait()
+        self.assertEqual([], self.ends_with(0, classic))
+
     def test_a_drive_that_does_not_answer_is_reported(self):
         machine = self.run_guarded()
         self.drive.answers = False

@@ -387,7 +387,11 @@ void Launch::end() {
     if (journal_) {
         journal_->end_values();
     }
-    machine_.shut_down();
+    const std::string failed_stops = machine_.end_report();
+    if (!failed_stops.empty()) {
+        write_all(STDERR_FILENO, failed_stops);
+        status_ = std::max(status_, 1);
+    }
     programs_.end_orphans();
 }
 

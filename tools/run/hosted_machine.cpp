@@ -296,6 +296,18 @@ void HostedMachine::shut_down() {
     }
 }
 
+std::string HostedMachine::end_report() {
+    shut_down();
+    const auto lock = session.lock();
+    std::string report;
+    for (const std::string& name : session.failed_stops()) {
+        report += fmt::format(
+            "'{}' raised a fault while it stopped: what it drives may run on; see its messages\n",
+            name);
+    }
+    return report;
+}
+
 bool HostedMachine::programs_have_ended() {
     const auto lock = session.lock();
     return session.ending() && session.programs().idle();

@@ -12,8 +12,8 @@
 #include "cli/signals.hpp"
 #include "commands/shell.hpp"
 #include "control/server.hpp"
-#include "machine/report/descriptor_watch.hpp"
 #include "machine/report/cycle_guard.hpp"
+#include "machine/report/descriptor_watch.hpp"
 #include "machine/report/exit_observer.hpp"
 #include "machine/report/setup_guard.hpp"
 #include "machine/session.hpp"
@@ -60,6 +60,9 @@ public:
     void stop_at_once() { stops_at_once_ = true; }
     /// Ends the run: sets outputs to their safe values.
     void shut_down();
+    /// Ends the run. Returns a line for each component that raised a fault while it stopped or was
+    /// unloaded: what it drives may not have stopped.
+    std::string end_report();
     /// Returns true when a fault has stopped a thread, or a thread has hung.
     bool faulted();
 

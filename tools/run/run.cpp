@@ -23,11 +23,21 @@ namespace hal::tools {
 
 namespace {
 
+/// Ends the machine. Returns 1, after printing the reason, when a component could not stop what it
+/// drives.
+int end_machine(HostedMachine& machine) {
+    const std::string report = machine.end_report();
+    write_all(STDERR_FILENO, report);
+    return report.empty() ? 0 : 1;
+}
+
 /// LinuxCNC's halrun: only what the commands print; threads start at the netlist's `start`; ends
 /// after the files unless the user types.
 int run_classic(HostedMachine& machine, const RunOptions& options) {
     const int status = machine.load();
-    if ((status != 0 && !options.keep_going) || machine.stop.requested()) return status;
+    if ((status != 0 && !options.keep_going) || machine.stop.requested()) {
+        return std::max(status, end_machine(machine));
+    }
     const bool converses = options.interactive || options.words.empty();
     int said = 0;
     if (options.tcl) {
@@ -35,7 +45,8 @@ int run_classic(HostedMachine& machine, const RunOptions& options) {
     } else if (converses) {
         said = machine.converse({"halcmd: ", "halcmd+: "});
     }
-    return std::max({status, said, machine.faulted() ? 1 : 0});
+    const int faulted = machine.faulted() ? 1 : 0;
+    return std::max({status, said, faulted, end_machine(machine)});
 }
 
 /// Returns the reason of the end, unless the user ended the run here.
@@ -68,7 +79,9 @@ int run_plain(HostedMachine& machine, const RunOptions& options, std::vector<Nod
               ServiceNotifier& service, RunJournal* journal) {
     int status =
         options.part.empty() ? machine.load() : load_node(machine, options, std::move(nodes));
-    if ((status != 0 && !options.keep_going) || machine.stop.requested()) return status;
+    if ((status != 0 && !options.keep_going) || machine.stop.requested()) {
+        return std::max(status, end_machine(machine));
+    }
     if (!attach_watchdog(machine, options, service)) return 1;
     if (journal) {
         journal->begin(machine);
@@ -102,8 +115,12 @@ int run_plain(HostedMachine& machine, const RunOptions& options, std::vector<Nod
     }
     // the threads take their figures with them
     const std::string report = timing_report(machine.session);
-    machine.shut_down();
+    const std::string failed_stops = machine.end_report();
     print("\n" + end_reason(machine.stop.signal()) + report);
+    if (!failed_stops.empty()) {
+        write_all(STDERR_FILENO, failed_stops);
+        status = 1;
+    }
     if (!options.watchdog.empty() && !machine.session.threads().watchdog_disarmed()) {
         const std::string& problem = machine.session.threads().watchdog_problem();
         const std::string reason = problem.empty()

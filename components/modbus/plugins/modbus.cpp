@@ -100,7 +100,10 @@ struct Modbus : hal::bus::BusComponent {
         background_.stop();
         end_guardian();
         followed_.take();
-        drain_events();
+        for (EventRecord record; has_image_ && followed_.pop(record);) {
+            reporter_->tell(record);
+        }
+        raise_unconfirmed_stops();
         if (reporter_) {
             reporter_->stop();
         }
@@ -264,6 +267,20 @@ private:
             image_.touch(n);
             image_.tell({stopped ? Event::stop_acknowledged : Event::stop_unconfirmed, n, 0,
                          hal::link::monotonic_ns() - since});
+        }
+    }
+
+    /// At the end: whether a slave has acknowledged its stop telegrams at last is in the image, also
+    /// when the event was reported by an earlier stop.
+    void raise_unconfirmed_stops() noexcept {
+        if (!has_image_ || is_virtual_) return;
+        for (std::uint32_t n = 0; n < arguments_.bus.slaves.size(); ++n) {
+            const bool is_unconfirmed =
+                !arguments_.bus.slaves[n].stop.empty() &&
+                image_.slave(n).stopped.load(std::memory_order_relaxed) == 0;
+            if (!is_unconfirmed) continue;
+            const auto* const text = texts_->fault(Event::stop_unconfirmed, n);
+            raise(text->text.c_str());
         }
     }
 

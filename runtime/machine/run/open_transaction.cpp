@@ -42,10 +42,10 @@ void note_functions_in_threads(Model& model) {
 }
 
 /// Destroys instances in the reverse order of their creation.
-void destroy(const std::vector<std::unique_ptr<Instance>>& instances, Executor& executor) {
+void destroy(const std::vector<std::unique_ptr<Instance>>& instances, SessionState& state) {
     for (auto it = instances.rbegin(); it != instances.rend(); ++it) {
-        destroy_instance(**it);
-        end_conditions(executor, **it);
+        state.destroy(**it);
+        end_conditions(*state.executor, **it);
     }
 }
 
@@ -294,10 +294,10 @@ void OpenTransaction::close_edit() {
     }
     state_.faults.collect();  // before the plugins whose texts they use
     auto& removed = edit_->removed();
-    destroy(removed.instances, *state_.executor);
+    destroy(removed.instances, state_);
     auto& replaced = edit_->replaced();
     for (auto one = replaced.rbegin(); one != replaced.rend(); ++one) {
-        destroy(one->other->instances, *state_.executor);
+        destroy(one->other->instances, state_);
     }
     // another instance may soon be where theirs was
     if (!removed.instances.empty() || !replaced.empty()) {

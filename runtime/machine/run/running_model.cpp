@@ -67,6 +67,16 @@ Failure SessionState::start(Instance& instance) {
     return failure;
 }
 
+void SessionState::destroy(Instance& instance) {
+    const auto faults = [this] {
+        return executor ? executor->board().outside_cycle.load(std::memory_order_relaxed) : 0;
+    };
+    const std::uint64_t before = faults();
+    destroy_instance(instance);
+    if (faults() == before) return;
+    failed_stops.push_back(instance.name);
+}
+
 void end_conditions(Executor& executor, const Instance& instance) {
     const auto* const first = static_cast<const char*>(instance.memory);
     const std::size_t size =
@@ -158,13 +168,16 @@ void RunningModel::when_committed(std::function<void()> action) {
     }
 }
 
+const std::vector<std::string>& RunningModel::failed_stops() const { return state_->failed_stops; }
+
 namespace {
 
 /// Destroys all instances in the reverse order of their creation.
-void destroy_instances(const Model& model) {
-    for (auto c = model.components.rbegin(); c != model.components.rend(); ++c) {
+void destroy_instances(SessionState& state) {
+    const auto& components = state.model.components;
+    for (auto c = components.rbegin(); c != components.rend(); ++c) {
         for (auto i = (*c)->instances.rbegin(); i != (*c)->instances.rend(); ++i) {
-            destroy_instance(**i);
+            state.destroy(**i);
         }
     }
 }
@@ -176,7 +189,7 @@ void RunningModel::shut_down() {
     if (s.life != SessionState::Life::running) return;
     s.life = SessionState::Life::shut;
     s.transaction.abandon();
-    if (s.options.check_only) return destroy_instances(s.model);
+    if (s.options.check_only) return destroy_instances(s);
     s.executor->end_rows();  // the cycles that follow compute nothing
     threads_.stop();
     // a function that hangs may still use its instance: leave everything as it is, and a watchdog
@@ -186,7 +199,7 @@ void RunningModel::shut_down() {
         return;
     }
     threads_.disarm_watchdog();
-    destroy_instances(s.model);
+    destroy_instances(s);
 }
 
 }  // namespace hal

@@ -102,6 +102,9 @@ public:
     /// Rolls back an open transaction, stops the threads with safe outputs, and stops and destroys
     /// all instances. Idempotent.
     void shut_down();
+    /// Returns the instances that have raised a fault while they were stopped or destroyed: what
+    /// they drive may not have stopped.
+    const std::vector<std::string>& failed_stops() const;
 
     const SessionOptions& options() const;
     const Model& model() const;

@@ -51,6 +51,7 @@ struct SessionState {
     Traces traces{view};
     hal_status status{sizeof status, nullptr, nullptr};  ///< for plugins
     std::vector<std::string> refused;  ///< by the system: "memory locking"
+    std::vector<std::string> failed_stops;  ///< RunningModel::failed_stops()
     Life life = Life::running;
     std::stop_token ending;  ///< RunningModel::end_token()
 
@@ -58,6 +59,8 @@ struct SessionState {
     void offer_names(Diagnostics& diagnostics);
     /// Starts an instance. Returns why it cannot.
     Failure start(Instance& instance);
+    /// Stops and destroys an instance, and notes when it raises a fault meanwhile.
+    void destroy(Instance& instance);
 };
 
 /// The faults of an instance that was stopped or destroyed do not last any more.

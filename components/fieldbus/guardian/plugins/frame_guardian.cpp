@@ -282,8 +282,15 @@ private:
     void report_unsent(bool has_ended) noexcept {
         const StopRecord stop = memory().record.last();
         const Outcome outcome = stop.status.outcome;
-        if (has_ended && outcome != Outcome::sending && outcome != Outcome::delayed) return;
-        reporter_.tell({.event = Event::not_sent, .stop = stop});
+        const bool is_sent =
+            has_ended && outcome != Outcome::sending && outcome != Outcome::delayed;
+        if (!is_sent) {
+            reporter_.tell({.event = Event::not_sent, .stop = stop});
+        }
+        if (!is_sent || outcome == Outcome::unconfirmed) {
+            const Event event = is_sent ? Event::unconfirmed : Event::delayed;
+            outcome_fault_.begin(faults_, this, fault_texts_.of(event, 0)->text.c_str());
+        }
     }
 
     /// Of the background thread: sees the end of the guardian and one that stalls, starts another
