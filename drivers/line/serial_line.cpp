@@ -51,7 +51,7 @@ std::string make_raw(int fd, const Options& o) {
     if (o.parity == Parity::odd) {
         t.c_cflag |= PARODD;
     }
-    t.c_cc[VMIN] = 0;
+    t.c_cc[VMIN] = 1;
     t.c_cc[VTIME] = 0;
     const auto* speed = std::find_if(std::begin(speeds), std::end(speeds),
                                      [&](const Speed& s) { return s.baud == o.baud; });
@@ -91,9 +91,10 @@ public:
         return sent == static_cast<ssize_t>(bytes.size());
     }
     std::size_t receive(std::span<std::uint8_t> bytes, std::int64_t now_ns) noexcept override {
-        if (!fd_) return 0;
+        if (!fd_ || bytes.empty()) return 0;
         const ssize_t count = ::read(fd_.get(), bytes.data(), bytes.size());
-        if (count < 0 && errno != EAGAIN && errno != EINTR) {
+        // 0: the device is gone; without bytes it would be EAGAIN
+        if (count == 0 || (count < 0 && errno != EAGAIN && errno != EINTR)) {
             lose(now_ns);
         }
         return count > 0 ? static_cast<std::size_t>(count) : 0;

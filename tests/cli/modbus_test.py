@@ -34,6 +34,12 @@ TCP = BUS.replace("serial:line", "{line}")
 CONFIRM = "[bus]\nlink = sim:c\n[slave 3 meter]\nread a = holding 0\nconfirm = yes\n"
 
 
+def open_files(pid):
+    """What the descriptors of a process refer to."""
+    folder = f"/proc/{pid}/fd"
+    return [os.readlink(f"{folder}/{number}") for number in os.listdir(folder)]
+
+
 class Modbus(Case):
     def setUp(self):
         super().setUp()
@@ -62,21 +68,43 @@ class Modbus(Case):
         node.terminate()
         node.wait(timeout=TIMEOUT)
 
-    def test_a_line_that_is_closed(self):
-        with socket.create_server(("127.0.0.1", 0)) as server:
-            line = f"tcp:127.0.0.1:{server.getsockname()[1]}"
-            closer = threading.Thread(target=lambda: server.accept()[0].close())
-            closer.start()
-            # whether the request is accepted depends on when the end of the connection arrives
-            self.assertIn(
-                self.bad("modbus", "read", line, "1", "holding", "0"),
-                (
-                    f"hal modbus read: {line} is lost or does not accept the request\n",
-                    "hal modbus read: slave 1 does not answer; check its address, baud rate, "
-                    "parity and wiring\n",
-                ),
-            )
-            closer.join()
+    def closing_device(self):
+        """A device that accepts each connection, reads a request, and closes it; its line."""
+        server = socket.create_server(("127.0.0.1", 0))
+
+        def serve():
+            while True:
+                try:
+                    connection, _ = server.accept()
+                except OSError:
+                    return
+                with connection:
+                    connection.recv(256)
+
+        thread = threading.Thread(target=serve)
+        thread.start()
+        self.addCleanup(thread.join)
+        self.addCleanup(server.close)
+        self.addCleanup(server.shutdown, socket.SHUT_RDWR)
+        return f"tcp:127.0.0.1:{server.getsockname()[1]}"
+
+    def test_a_connection_that_is_closed_is_named(self):
+        line = self.closing_device()
+        closed = (
+            f"{line} has closed the connection before the answer of slave 1; check its address, "
+            "and whether the device accepts another connection\n"
+        )
+        for words in (("read", line, "1", "holding", "0"), ("write", line, "1", "coil", "0", "1")):
+            self.assertEqual(f"hal modbus {words[0]}: {closed}", self.bad("modbus", *words))
+        self.assertEqual(
+            f"hal modbus scan: no slave answers: {closed}",
+            self.bad("modbus", "scan", line, "--first", "1", "--last", "2"),
+        )
+        # slave 0 is no broadcast on TCP: the device has not accepted it
+        self.assertIn(
+            f"{line} has closed the connection",
+            self.bad("modbus", "write", line, "0", "coil", "0", "1"),
+        )
 
     def test_slaves_make_no_connection(self):
         self.assertEqual(
@@ -263,10 +291,7 @@ class Modbus(Case):
 
         def seen():
             os.write(master, request)
-            return any(
-                os.readlink(f"/proc/{monitor.pid}/fd/{fd}") == os.ttyname(slave)
-                for fd in os.listdir(f"/proc/{monitor.pid}/fd")
-            )
+            return os.ttyname(slave) in open_files(monitor.pid)
 
         wait_until(seen, "it listens")
         os.write(master, request + bytes.fromhex("0103020000B844"))
@@ -279,6 +304,19 @@ class Modbus(Case):
         self.assertIn("01 03 21 03 00  wrong check sequence", out)
         os.close(master)
         os.close(slave)
+
+    def test_a_monitor_reports_that_its_line_is_lost(self):
+        master, slave = pty.openpty()
+        os.symlink(os.ttyname(slave), self.folder / "line")
+        monitor = self.start("modbus", "monitor", "serial:line", "--for", "1s", loaded=False)
+        target = os.ttyname(slave)
+        wait_until(lambda: target in open_files(monitor.pid), "it listens")
+        os.close(slave)
+        os.close(master)
+        self.assertEqual(
+            "hal modbus monitor: serial:line is lost; it is opened again\n",
+            monitor.communicate(timeout=TIMEOUT)[1],
+        )
 
     def test_a_simulation_does_not_open_a_real_line(self):
         self.write("a.hal", "loadrt modbus config=bus.modbus link=tcp:127.0.0.1:1\n")

@@ -6,6 +6,8 @@
 #include <fmt/core.h>
 #include <memory>
 #include <optional>
+#include <unistd.h>
+#include <utility>
 
 #include "bus/modbus/options.hpp"
 #include "cli/output.hpp"
@@ -34,12 +36,16 @@ public:
         const bool stream = line_->description().is_stream;
         framing_ = stream && !options.rtu ? Framing::tcp : Framing::rtu;
         address_ = address;
+        return connect() ? "" : address + ": no connection within 2 s";
+    }
+    /// Opens a line again that was lost. Returns false when that takes more than 2 s.
+    bool connect() {
         const std::int64_t limit = link::monotonic_ns() + 2'000'000'000;
         while (!line_->is_open(link::monotonic_ns())) {
-            if (link::monotonic_ns() > limit) return address + ": no connection within 2 s";
+            if (link::monotonic_ns() > limit) return false;
             wait(10'000'000);
         }
-        return {};
+        return true;
     }
 
     struct Result {
@@ -48,8 +54,10 @@ public:
         std::vector<std::uint8_t> data;
         bool is_corrupt = false;
         bool is_sent = false;
+        bool is_lost = false;  ///< the line, before the answer was complete
     };
     Framing framing() const { return framing_; }
+    bool is_stream() const { return line_->description().is_stream; }
     const std::string& address() const { return address_; }
 
     /// Sends a request and waits for its answer.
@@ -60,12 +68,20 @@ public:
         bool echo_is_due = framing_ == Framing::rtu && request.function() <= 4;
         Result result;
         result.is_sent = line_->send(sent.span(), link::monotonic_ns());
-        if (!result.is_sent) return result;
+        if (!result.is_sent) {
+            result.is_lost = !line_->is_open(link::monotonic_ns());
+            return result;
+        }
         const std::int64_t limit =
             std::max(link::monotonic_ns(), line_->sent_until_ns()) + timeout_ns_;
         while (link::monotonic_ns() < limit) {
             wait(limit - link::monotonic_ns());
-            buffer.added(line_->receive(buffer.free_space(), link::monotonic_ns()));
+            const std::size_t count = line_->receive(buffer.free_space(), link::monotonic_ns());
+            if (count == 0 && !line_->is_open(link::monotonic_ns())) {
+                result.is_lost = true;
+                return result;
+            }
+            buffer.added(count);
             // an adapter without receiver disable: the answer to a read is not equal to its request
             if (echo_is_due && buffer.span().size() >= sent.size &&
                 std::equal(sent.span().begin(), sent.span().end(), buffer.span().begin())) {
@@ -143,10 +159,23 @@ std::string parse_target(const std::vector<std::string>& words, Target& target) 
     return {};
 }
 
+/// Returns what happened to a line that was lost before the answer.
+std::string loss_text(const Exchange& exchange, std::uint8_t unit) {
+    if (!exchange.is_stream()) {
+        return fmt::format("{} is lost; the request to slave {} has no answer", exchange.address(),
+                           unit);
+    }
+    return fmt::format(
+        "{} has closed the connection before the answer of slave {}; check its "
+        "address, and whether the device accepts another connection",
+        exchange.address(), unit);
+}
+
 int report(const Options& options, const Exchange& exchange, const Exchange::Result& result,
            const Pdu& request, std::uint8_t unit) {
+    if (result.is_lost) return fail(options, loss_text(exchange, unit));
     if (!result.is_sent) {
-        return fail(options, exchange.address() + " is lost or does not accept the request");
+        return fail(options, exchange.address() + " does not accept the request");
     }
     if (result.verdict == Verdict::exception) {
         return fail(options,
@@ -265,7 +294,8 @@ int run_modbus_write(const ModbusAccessOptions& options) {
     const auto result = exchange.ask(target.unit, request);
     const bool is_answered = result.verdict != Verdict::foreign || result.is_corrupt;
     // a broadcast is not answered, but over TCP it may be a request to the device itself
-    if (target.unit == broadcast_unit && result.is_sent && !is_answered) return 0;
+    const bool is_accepted = result.is_sent && !result.is_lost;
+    if (target.unit == broadcast_unit && is_accepted && !is_answered) return 0;
     if (result.verdict == Verdict::good) return 0;
     return report(options, exchange, result, request, target.unit);
 }
@@ -280,9 +310,14 @@ int run_modbus_scan(const ModbusScanOptions& options) {
     }
     StopRequest stop;
     int found = 0;
+    std::string loss;  // the first
     for (int unit = options.first; unit <= options.last && !stop.requested(); ++unit) {
         const auto address = static_cast<std::uint8_t>(unit);
+        if (!exchange.connect()) return fail(options, exchange.address() + " is lost");
         const auto result = exchange.ask(address, read_request(Function::read_holding, 0, 1));
+        if (loss.empty() && result.is_lost) {
+            loss = loss_text(exchange, address);
+        }
         if (result.verdict == Verdict::foreign && !result.is_corrupt) continue;
         ++found;
         std::string what = "answers";
@@ -294,6 +329,7 @@ int run_modbus_scan(const ModbusScanOptions& options) {
         }
         if (!print(fmt::format("slave {} {}\n", unit, what))) return 1;
     }
+    if (found == 0 && !loss.empty()) return fail(options, "no slave answers: " + loss);
     if (found == 0) {
         return fail(options,
                     "no slave answers; check baud rate, parity, wiring, and whether A and "
@@ -365,6 +401,13 @@ private:
     std::int64_t last_ns_;  // time of the newest bytes
 };
 
+/// Reports that the line was lost, or is open again.
+void report_line(const Options& options, const line::Line& line, bool is_open) {
+    const std::string& address = line.description().address;
+    const char* const what = is_open ? " is open again" : " is lost; it is opened again";
+    write_all(STDERR_FILENO, fmt::format("{}: {}{}\n", options.program, address, what));
+}
+
 }  // namespace
 
 /// `hal modbus monitor`: prints the frames on a serial line.
@@ -375,10 +418,14 @@ int run_modbus_monitor(const ModbusMonitorOptions& options) {
     StopRequest stop;
     const std::int64_t begin_ns = link::monotonic_ns();
     FramePrinter printer(begin_ns);
+    bool was_open = line.is_open(begin_ns);
     while (!stop.requested()) {
         const std::int64_t now_ns = link::monotonic_ns();
         if (options.for_ns >= 0 && now_ns - begin_ns >= options.for_ns) break;
-        line.is_open(now_ns);
+        const bool is_open = line.is_open(now_ns);
+        if (std::exchange(was_open, is_open) != is_open) {
+            report_line(options, line, is_open);
+        }
         printer.receive(line, now_ns);
         if (!printer.print_complete(now_ns)) return 1;
         pollfd p{line.descriptor(), POLLIN, 0};
