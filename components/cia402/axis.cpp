@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 namespace hal::cia402 {
@@ -559,15 +560,28 @@ void Axis::set_mode_bits(const AxisCommand& command) noexcept {
     }
 }
 
+namespace {
+
+/// Returns whether the drive's object of type T can hold a command in user units. [realtime]
+template <class T>
+bool fits(double user, const Factor& factor) noexcept {
+    const double exact = std::fabs(user * factor.ratio());
+    return exact <= static_cast<double>(std::numeric_limits<T>::max());
+}
+
+}  // namespace
+
 /// Fails when the commands, the factors or the limits of an axis in motion are invalid.
 void Axis::check_numbers(const AxisCommand& command, const AxisRules& rules) noexcept {
     if (const Factor* const f = unsound_factor(rules)) {
         fail(Cause::bad_factor, f->ratio(), 0.0);
     } else if (const double limit = negative_limit(rules); limit < 0.0) {
         fail(Cause::bad_limit, limit, 0.0);
-    } else if (!std::isfinite(command.velocity)) {
+    } else if (!fits<std::int32_t>(command.velocity, rules.velocity) ||
+               (orders_.mode == Mode::velocity &&
+                !fits<std::int16_t>(command.velocity, rules.vl))) {
         fail(Cause::bad_command, command.velocity, 0.0);
-    } else if (!std::isfinite(command.torque)) {
+    } else if (!fits<std::int16_t>(command.torque, rules.torque)) {
         fail(Cause::bad_command, command.torque, 0.0);
     }
 }

@@ -29,7 +29,7 @@ constexpr Mode any_other{-128};  // in preformatted messages: a mode without a n
 /// Returns the abbreviation of a mode, or its number.
 std::string name(Mode mode) {
     if (mode == Mode::none) return "none";
-    if (mode == any_other) return "another";
+    if (mode == any_other) return "of an unknown number";
     return *abbreviation(mode) != '-' ? std::string(abbreviation(mode))
                                       : std::to_string(static_cast<int>(mode));
 }

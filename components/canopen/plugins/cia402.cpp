@@ -474,7 +474,7 @@ sends, with the controller of the axis between the two.
 | 5 | the drive does not display the commanded mode |
 | 6 | following error above `max-following-error` |
 | 7 | `position-cmd` stepped farther than `max-step`, or was that far from `position-fb` at enabling |
-| 8 | a command is not a number, or too large: half the range of the drive's counter away |
+| 8 | a command is not a number, or too large: a position half the range of the drive's counter away, a velocity or torque that the drive's object cannot hold |
 | 9 | a scale is 0 or not a number |
 | 10 | the drive reports a homing error |
 | 11 | homing took longer than `homing-timeout` |
