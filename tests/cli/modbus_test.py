@@ -100,7 +100,7 @@ class Modbus(Case):
             f"hal modbus scan: no slave answers: {closed}",
             self.bad("modbus", "scan", line, "--first", "1", "--last", "2"),
         )
-        # slave 0 is no broadcast on TCP: the device has not accepted it
+        # on TCP slave 0 is a device: it has not accepted the request
         self.assertIn(
             f"{line} has closed the connection",
             self.bad("modbus", "write", line, "0", "coil", "0", "1"),
