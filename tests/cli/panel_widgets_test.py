@@ -5,7 +5,7 @@
 import os
 import signal
 
-from harness import SERVO, wait_until
+from harness import SERVO, suspend, wait_until
 from panel_page import Page, main
 
 WIDGETS = """<pyvcp><vbox>
@@ -91,6 +91,24 @@ class Widgets(Page):
         self.browser.evaluate(
             "document.querySelector('input[type=range]').value = -1; document.querySelector('input[type=range]').dispatchEvent(new Event('input'))"
         )
+        self.becomes("jog.speed", "-1")
+
+    def test_outputs_stay_safe_after_a_server_that_stood_still(self):
+        self.operate(
+            text="component jog\ntimeout 400ms\nslider speed min=-1 max=1 safe=0.2\n",
+            name="jog.panel",
+        )
+        move = "document.querySelector('input[type=range]').value = {}; document.querySelector('input[type=range]').dispatchEvent(new Event('input'))"
+        self.browser.evaluate(move.format(0.5))
+        self.becomes("jog.speed", "0.5")
+        suspend(self.process.pid)
+        try:
+            self.becomes("jog.speed", "0.2")  # by the runtime
+        finally:
+            os.kill(self.process.pid, signal.SIGCONT)
+        self.browser.wait("document.querySelector('input[type=range]').value === '0.2'")
+        self.assertEqual("0.2", self.value("jog.speed"))
+        self.browser.evaluate(move.format(-1))
         self.becomes("jog.speed", "-1")
 
     def test_a_killed_browser_and_a_killed_server_lose_the_outputs(self):

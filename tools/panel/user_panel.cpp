@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "panel/clock.hpp"
 #include "panel/event_log.hpp"
 #include "text/quoting.hpp"
 
@@ -90,6 +91,7 @@ std::string UserPanel::values() const {
 }
 
 std::string UserPanel::write(std::string_view name, const Json& value) {
+    notice_stall(now_ms());
     const auto at = std::find_if(layout_.pins.begin(), layout_.pins.end(),
                                  [&](const PanelPin& pin) { return pin.name == name; });
     Json converted;
@@ -138,26 +140,36 @@ void UserPanel::page_lost() {
             write(pin.name, pin.safe);
         }
     }
-    flush();
+    flush(Life::unchanged);
     log_.add("panel", "no page controls the panel; its pins are set to their safe values");
     if (on_values) {
         on_values(values());
     }
 }
 
-void UserPanel::flush() {
+void UserPanel::notice_stall(std::int64_t now) {
+    const bool stalled = noticed_ms_ != 0 && now - noticed_ms_ > layout_.timeout_ms;
+    noticed_ms_ = now;
+    if (stalled) {
+        page_lost();
+    }
+}
+
+void UserPanel::flush(Life life) {
     if (!registered_ || changed_.empty()) return;
     std::string request =
         fmt::format("{{\"id\":2,\"exchange\":{},\"write\":[", text_of(layout_.component));
     for (std::size_t i = 0; i < changed_.size(); ++i) {
         request += fmt::format("{}{},{}", i == 0 ? "" : ",", changed_[i], shown_[changed_[i]]);
     }
-    if (link_.send(request + "]}")) {
+    request += life == Life::sign ? "]}" : "],\"alive\":false}";
+    if (link_.send(request)) {
         changed_.clear();
     }
 }
 
 void UserPanel::tick(std::int64_t now) {
+    notice_stall(now);
     if (!link_.up()) {
         if (now - retried_ms_ < retry_ms) return;
         retried_ms_ = now;

@@ -30,8 +30,10 @@ public:
 
     /// Sets an output pin. Returns a sentence when the pin or the value is invalid.
     std::string write(std::string_view name, const nlohmann::json& value);
+    /// Whether an exchange tells the machine that the panel is alive.
+    enum class Life { sign, unchanged };
     /// Sends what was written to the machine.
-    void flush();
+    void flush(Life life = Life::sign);
     /// A page with control is connected.
     void page_active();
     /// No page controls the panel: its outputs take their safe values.
@@ -48,19 +50,23 @@ private:
     /// have left, unless a page has set them since. The other outputs are written.
     void take_over(const nlohmann::json& current);
     bool is_changed(std::size_t pin) const;
+    /// After a time without CPU that was longer than the timeout, the machine has set the safe
+    /// values: they stay until a page writes. Call it before anything is written.
+    void notice_stall(std::int64_t now_ms);
 
     PanelLayout layout_;
     std::string text_;
     EventLog& log_;
     ControlLink link_;
-    std::vector<std::string> shown_;   ///< the newest value of each pin, as JSON
+    std::vector<std::string> shown_;  ///< the newest value of each pin, as JSON
     std::vector<std::size_t> inputs_;  ///< the pins that exchange reads, in order
-    std::vector<std::size_t> changed_; ///< outputs that the machine does not have yet
+    std::vector<std::size_t> changed_;  ///< outputs that the machine does not have yet
     bool registered_ = false;
     bool waiting_ = false;
     bool active_ = false;
     bool begun_ = false;  ///< a page had control
     std::int64_t retried_ms_ = 0;
+    std::int64_t noticed_ms_ = 0;  ///< when notice_stall() was called last; 0: never
 };
 
 }  // namespace hal::tools
