@@ -311,6 +311,7 @@ class Modbus(Case):
         monitor = self.start("modbus", "monitor", "serial:line", "--for", "1s", loaded=False)
         target = os.ttyname(slave)
         wait_until(lambda: target in open_files(monitor.pid), "it listens")
+        (self.folder / "line").unlink()  # another program may get the terminal
         os.close(slave)
         os.close(master)
         self.assertEqual(

@@ -30,7 +30,7 @@ public:
 
     /// Sets an output pin. Returns a sentence when the pin or the value is invalid.
     std::string write(std::string_view name, const nlohmann::json& value);
-    /// Whether an exchange tells the machine that the panel is alive.
+    /// Whether an exchange reports to the machine that the panel is alive.
     enum class Life { sign, unchanged };
     /// Sends what was written to the machine.
     void flush(Life life = Life::sign);
