@@ -29,9 +29,13 @@ constexpr Mode any_other{-128};  // in preformatted messages: a mode without a n
 /// Returns the abbreviation of a mode, or its number.
 std::string name(Mode mode) {
     if (mode == Mode::none) return "none";
-    if (mode == any_other) return "of an unknown number";
+    if (mode == any_other) return "another";
     return *abbreviation(mode) != '-' ? std::string(abbreviation(mode))
                                       : std::to_string(static_cast<int>(mode));
+}
+
+std::string commanded_mode(Mode mode) {
+    return mode == any_other ? "this number" : "mode " + name(mode);
 }
 
 std::string state_words(State state) {
@@ -134,7 +138,8 @@ std::string sentence(const Failure& f) {
         return asked + "drive left " + quoted(to_string(f.before)) + " for " +
                state_words(f.state) + " without a command";
     case Cause::mode_rejected:
-        return asked + "drive does not accept mode " + name(f.mode) + ", displays " + name(f.shown);
+        return asked + "drive does not accept " + commanded_mode(f.mode) + ", displays " +
+               name(f.shown);
     case Cause::step_rejected:
         return asked + (f.step == Step::wait
                             ? "position-cmd steps farther than max-step"

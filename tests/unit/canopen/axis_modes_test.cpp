@@ -269,6 +269,9 @@ TEST(AxisFailure, Every_sentence_of_the_cycle_is_there_beforehand) {
     odd.shown = Mode::none;
     EXPECT_STREQ("mode: drive does not accept mode csp, displays none for {} s; axis off",
                  sentences.find(odd));
+    odd.mode = static_cast<Mode>(99);
+    EXPECT_STREQ("mode: drive does not accept this number, displays none for {} s; axis off",
+                 sentences.find(odd));
     for (unsigned cause = 1; cause < causes; ++cause) {
         Failure f;
         f.cause = static_cast<Cause>(cause);
