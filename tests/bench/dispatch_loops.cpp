@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: MIT
 // The components' own sources, compiled into the bench with the flags of a plugin, so that the
 // loops run the same code on the same structs; only the call through the plan is missing.
+#include <limits>
 #include <numbers>
 #include <stdexcept>
 
 #include "dispatch_loops.hpp"
 #include "hal/component.hpp"
+#include "hal/interruption.hpp"
 #include "hal/limit.hpp"
+#include "hal/retained.hpp"
 
 #undef HAL_COMPONENT
 #define HAL_COMPONENT(...)
