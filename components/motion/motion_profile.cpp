@@ -150,6 +150,7 @@ struct MotionProfile : hal::Component {
         last_mode_ = mode;
         if (interruption_.accept()) {
             forget();
+            waiting_ = false;
             generator_.put(generator_.state().position);
         }
 

@@ -40,7 +40,7 @@ public:
     }
 
     void update(hal::Cycle cycle) noexcept {
-        if (interruption_.accept() && at_ != 0) {
+        if (interruption_.accept() && started_) {
             waits_for_reset_ = true;
         }
         if (reset || !enable) {
@@ -166,7 +166,7 @@ At most one transition is taken per cycle. A pin `in-STEP` for each step is TRUE
 most 64 inputs, 64 outputs, 128 steps and 32 transitions per step. Names have a to z, 0 to 9 and
 `-`.
 
-After a stop of the thread in any other step the program is in its first step, with all outputs
+After a stop of the thread a program that has left its first step is there again, with all outputs
 FALSE, until `reset` is TRUE or `enable` is FALSE for a cycle.
 
     loadrt step_program file=match.program names=match
