@@ -65,8 +65,8 @@ class Live(Case):
         self.assertEqual(
             {
                 "applied": False,
-                "message": "an INI file has values for netlists and no commands: changed ones "
-                "take effect with the next start",
+                "message": "an INI file has values for netlists and no commands: a machine has "
+                "them from its start",
             },
             answer,
         )
@@ -74,7 +74,7 @@ class Live(Case):
         answer = self.apply(NETLIST.replace("in0 2", "in0 20"))
         self.assertTrue(answer["applied"])
         self.assertIn(
-            "values.ini has changed: its values take effect with the next start\n",
+            "values.ini has changed since it was opened: a machine has its values from its start\n",
             answer["message"],
         )
         self.assertEqual("20", self.in_machine("adder.in0"))

@@ -425,8 +425,10 @@ std::string LanguageFeatures::changed_ini_files() const {
     std::string lines;
     for (const auto& [path, document] : workspace_.documents()) {
         if (is_ini(path) && document.saved.text() != document.text.text()) {
-            lines += fmt::format("{} has changed: its values take effect with the next start\n",
-                                 path.substr(path.rfind('/') + 1));
+            lines += fmt::format(
+                "{} has changed since it was opened: a machine has its values "
+                "from its start\n",
+                path.substr(path.rfind('/') + 1));
         }
     }
     return lines;
@@ -446,8 +448,8 @@ Json LanguageFeatures::execute_command(const Json& params) {
     if (is_ini(document->path)) {
         return {{"applied", false},
                 {"message",
-                 "an INI file has values for netlists and no commands: changed ones "
-                 "take effect with the next start"}};
+                 "an INI file has values for netlists and no commands: a machine "
+                 "has them from its start"}};
     }
     const CheckedNetlist* const netlist = workspace_.netlist_of(document->path);
     if (!netlist) throw RequestError(ErrorCode::request_failed, "the document is not a netlist");
