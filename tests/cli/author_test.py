@@ -56,14 +56,14 @@ REJECTED = {
     ),
     "a safe value NaN": (
         IN + OUT.replace('"the output"', '"the output", {.safe = std::nan("")}') + RUN + STEP,
-        "mine.cpp:7: component 'mine' cannot make 'mine.0': pin 'out' has the safe value nan; it must be a number",
+        "mine.cpp:7: component 'mine' cannot make 'mine.0': pin 'out' declares the safe value nan; it must be a number",
     ),
     "an infinite safe value of a finite output": (
         IN
         + OUT.replace('"the output"', '"the output", {.safe = -HUGE_VAL, .finite = true}')
         + RUN
         + STEP,
-        "mine.cpp:7: component 'mine' cannot make 'mine.0': pin 'out' has the safe value -inf, although it is declared finite",
+        "mine.cpp:7: component 'mine' cannot make 'mine.0': pin 'out' declares the safe value -inf, although it is declared finite",
     ),
     "a finite bool": (
         IN + OUT + '    hal::Out<bool> on{*this, "on", "always", {.finite = true}};\n' + RUN + STEP,

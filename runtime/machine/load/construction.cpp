@@ -48,7 +48,7 @@ bool good_name(std::string_view name) {
 std::string safe_value_problem(const hal_pin_decl& decl) {
     if (!(decl.flags & HAL_PIN_SAFE) || decl.type != HAL_TYPE_FLOAT) return "";
     if (std::isfinite(decl.safe.real)) return "";
-    const std::string value = "has the safe value " + format_value(HAL_TYPE_FLOAT, decl.safe);
+    const std::string value = "declares the safe value " + format_value(HAL_TYPE_FLOAT, decl.safe);
     if (std::isnan(decl.safe.real)) return value + "; it must be a number";
     return decl.flags & HAL_PIN_FINITE ? value + ", although it is declared finite" : "";
 }
