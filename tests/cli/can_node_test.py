@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 # packages: canopen
 """hal can sdo, pdo and lss: a simulated node on udp: is asked and set up by hand."""
+
 import csv
 import json
 import os
@@ -26,16 +27,8 @@ class Node(Case):
     SIZE = ("--inputs", "16", "--outputs", "16", "--analog-inputs", "2", "--analog-outputs", "2")
 
     def start_node(self):
-        log = open(self.folder / "node.log", "w")
-        self.addCleanup(log.close)
-        node = subprocess.Popen(
-            ["hal", "node", "io", "--link", self.bus, "--id", self.IDENTIFIER, *self.SIZE],
-            executable=str(HAL),
-            cwd=self.folder,
-            env=self.environment,
-            stdin=subprocess.DEVNULL,
-            stdout=log,
-            stderr=subprocess.STDOUT,
+        node = self.start_logged(
+            "node", "io", "--link", self.bus, "--id", self.IDENTIFIER, *self.SIZE
         )
         self.addCleanup(self.end, node)
         wait_until(lambda: self.ready(), "the node answers")

@@ -222,6 +222,20 @@ class Case(unittest.TestCase):
             wait_until(ready, "the machine runs")
         return machine
 
+    def start_logged(self, *words, log="node.log", mode="w"):
+        """Starts `hal …` in the background with its output in a file; the test ends it."""
+        output = open(self.folder / log, mode)
+        self.addCleanup(output.close)
+        return subprocess.Popen(
+            ["hal", *map(str, words)],
+            executable=str(HAL),
+            cwd=self.folder,
+            env=self.environment,
+            stdin=subprocess.DEVNULL,
+            stdout=output,
+            stderr=subprocess.STDOUT,
+        )
+
     def end(self, machine, number=signal.SIGTERM):
         """Ends a process; its output."""
         if machine.poll() is None:

@@ -2,25 +2,16 @@
 """An emulated Mesa card in a process of its own, for tests."""
 
 import signal
-import subprocess
 
-from harness import HAL, TIMEOUT, wait_until
+from harness import TIMEOUT, wait_until
 
 
 class MesaNode:
     """For a Case with a `host` and a file card.mesa of a 7i92."""
 
     def node(self, *words):
-        log = open(self.folder / "node.log", "a")
-        self.addCleanup(log.close)
-        node = subprocess.Popen(
-            ["hal", "node", "mesa", "card.mesa", "--address", self.host, *words],
-            executable=str(HAL),
-            cwd=self.folder,
-            env=self.environment,
-            stdin=subprocess.DEVNULL,
-            stdout=log,
-            stderr=subprocess.STDOUT,
+        node = self.start_logged(
+            "node", "mesa", "card.mesa", "--address", self.host, *words, mode="a"
         )
         self.addCleanup(self.end_node, node)
         wait_until(lambda: f"7i92 at {self.host}" in self.log(), "the card runs")

@@ -4,10 +4,9 @@
 
 import os
 import signal
-import subprocess
 import unittest
 
-from harness import HAL, TIMEOUT, Case, wait_until
+from harness import TIMEOUT, Case, wait_until
 
 SLAVES = """[bus]
 link = sim:unused
@@ -99,18 +98,14 @@ class Mb2hal(Case):
         self.write("slaves.modbus", SLAVES)
 
     def node(self, link):
-        log = open(self.folder / "node.log", "w")
-        self.addCleanup(log.close)
         settings = ["drive.status=1234", "drive.more=65535", "drive.alarm=1", "meter.power=42"]
-        node = subprocess.Popen(
-            ["hal", "node", "modbus", "slaves.modbus", "--link", link]
-            + [word for setting in settings for word in ("--set", setting)],
-            executable=str(HAL),
-            cwd=self.folder,
-            env=self.environment,
-            stdin=subprocess.DEVNULL,
-            stdout=log,
-            stderr=subprocess.STDOUT,
+        node = self.start_logged(
+            "node",
+            "modbus",
+            "slaves.modbus",
+            "--link",
+            link,
+            *[word for setting in settings for word in ("--set", setting)],
         )
         self.addCleanup(node.wait)
         self.addCleanup(node.kill)

@@ -8,13 +8,12 @@ import os
 import pty
 import signal
 import socket
-import subprocess
 import threading
 import time
 import tty
 import unittest
 
-from harness import HAL, TIMEOUT, Case, wait_until
+from harness import TIMEOUT, Case, wait_until
 
 BUS = """[bus]
 link = serial:line
@@ -46,17 +45,7 @@ class Modbus(Case):
         self.write("bus.modbus", BUS)
 
     def node(self, link, *words):
-        log = open(self.folder / "node.log", "w")
-        self.addCleanup(log.close)
-        node = subprocess.Popen(
-            ["hal", "node", "modbus", "bus.modbus", "--link", link, *words],
-            executable=str(HAL),
-            cwd=self.folder,
-            env=self.environment,
-            stdin=subprocess.DEVNULL,
-            stdout=log,
-            stderr=subprocess.STDOUT,
-        )
+        node = self.start_logged("node", "modbus", "bus.modbus", "--link", link, *words)
         self.addCleanup(self.end_node, node)
         wait_until(
             lambda: "2 slaves on" in (self.folder / "node.log").read_text(), "the slaves run"
