@@ -3,11 +3,12 @@
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import unittest
 
-from harness import HAL, SERVO, Case, needs_package, packages_left_out
+from harness import HAL, ROOT, SERVO, Case, needs_package, packages_left_out
 
 
 class Help(Case):
@@ -82,6 +83,13 @@ class WrongWords(Case):
             "usage: ./hal test [quick]\n",
             self.good("help", "test"),
         )
+
+    def test_the_commands_of_a_clone_are_those_of_its_script(self):
+        head = (ROOT / "hal").read_text().partition("\nset -eu\n")[0]
+        described = set(re.findall(r"(?m)^#     \./hal (\w+)", head)) - {"run"}
+        self.environment["HALCYON_BUILD"] = "/tree/hal"
+        listed = self.good("help").partition("\nIn this clone also:\n")[2].partition("\n\n")[0]
+        self.assertEqual(described, {line.split()[0] for line in listed.splitlines()})
 
     def test_commands_for_tests_are_not_listed(self):
         text = self.good("sim", self.write("m.hal", "newthread t 1ms\nhelp\n"), "--for", "1ms")

@@ -184,6 +184,19 @@ TEST_F(StopTest, an_interrupted_session_ends_the_texts_and_queries_of_clients_ea
     EXPECT_EQ(machine->session.model().find_signal("x0"), nullptr);
 }
 
+TEST_F(StopTest, a_waiting_command_states_that_the_machine_ends) {
+    serve();
+    const auto c = client();
+    const auto id = c->send({{"run", "loadusr -w sleep 1000"}});
+    EXPECT_TRUE(eventually([&] {
+        const auto lock = machine->session.lock();
+        return !machine->session.programs().idle();
+    }));
+    machine->session.interrupt();
+    const std::string text = c->wait(id)["err"].get<std::string>();
+    EXPECT_NE(text.find("'loadusr' was interrupted: the machine ends"), std::string::npos) << text;
+}
+
 TEST_F(StopTest, a_component_is_served_until_the_machine_has_ended_also_after_a_rejection) {
     serve();
     const auto c = client();
