@@ -198,7 +198,7 @@ private:
                error.find("virtual") != std::string::npos;
     }
 
-    /// Notes the first mistake in the declaration of a pin. Returns whether there is none.
+    /// Returns whether the declarations of all pins are valid; notes the first mistake.
     bool check_pins(const Instance& instance) {
         for (const auto& pin : instance.pins) {
             const std::string mistake = mistake_of(*pin, own_name(*pin, instance));

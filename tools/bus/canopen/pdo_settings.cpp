@@ -18,7 +18,8 @@ constexpr unsigned max_pdos = 512;      // of each direction
 constexpr unsigned pdos_per_axis = 64;  // CiA 402: an offset per axis
 constexpr unsigned max_dummy_index = 7;  // CiA 301: objects that fill a gap in a mapping
 
-/// Reads a value from the node, or from its description. Returns why there is none.
+/// Reads a value from the node, or from its description. Returns the abort code of a value that
+/// cannot be read.
 using Source = std::function<Abort(std::uint16_t index, std::uint8_t sub, std::uint32_t& value)>;
 
 Source of_node(NodeClient& station, std::uint8_t node) {
