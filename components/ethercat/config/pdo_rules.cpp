@@ -72,6 +72,108 @@ std::string too_long(const PdoContext& context, const master::SyncManager& sm) {
            std::to_string(sm.number) + " of '" + context.type + "' takes " + std::to_string(max);
 }
 
+/// The rules for the PDOs that a configuration assigns to one direction of a slave.
+class PdoCheck {
+public:
+    PdoCheck(const PdoContext& context, const std::vector<master::SyncManager>& managers,
+             bool output, const std::string& key, Span at, Report& report)
+        : context_(context),
+          managers_(managers),
+          output_(output),
+          key_(key),
+          at_(at),
+          report_(report) {}
+
+    void run() {
+        check_exclusions();
+        check_mandatory();
+        for (const master::SyncManager& sm : managers_) {
+            check_length(sm);
+            check_assignment(sm);
+            check_entries(sm);
+        }
+    }
+
+private:
+    void error(std::string sentence, std::string help) {
+        report_.error(Topic::object, at_, std::move(sentence), std::move(help));
+    }
+
+    std::vector<const esi::Pdo*> assigned() const {
+        std::vector<const esi::Pdo*> pdos;
+        for (const master::SyncManager& sm : managers_) {
+            for (const master::Pdo& p : sm.pdos) {
+                if (const esi::Pdo* const described = context_.device.find_pdo(p.index)) {
+                    pdos.push_back(described);
+                }
+            }
+        }
+        return pdos;
+    }
+
+    void check_exclusions() {
+        const std::vector<const esi::Pdo*> pdos = assigned();
+        for (std::size_t i = 0; i < pdos.size(); ++i) {
+            for (std::size_t k = i + 1; k < pdos.size(); ++k) {
+                if (!exclude_each_other(*pdos[i], *pdos[k])) continue;
+                error("PDOs " + pdo_text(pdos[i]->index) + " and " + pdo_text(pdos[k]->index) +
+                          " of '" + context_.type + "' exclude each other",
+                      "assign only one of them");
+            }
+        }
+    }
+
+    void check_mandatory() {
+        for (const esi::Pdo& p : described(context_.device, output_)) {
+            if (!p.mandatory || is_assigned(managers_, p.index)) continue;
+            error("PDO " + pdo_text(p.index) + " of '" + context_.type + "' must be assigned",
+                  "write it as well: " + key_ + " = " + pdo_text(p.index));
+        }
+    }
+
+    void check_length(const master::SyncManager& sm) {
+        const std::string sentence = too_long(context_, sm);
+        if (sentence.empty()) return;
+        error(sentence,
+              context_.samples > 1 ? "write a smaller number of samples" : "leave out objects");
+    }
+
+    /// ETG.2000: only a device with CoE and PdoAssign has an assignment that can be changed.
+    void check_assignment(const master::SyncManager& sm) {
+        const auto& mailbox = context_.device.mailbox;
+        if (mailbox && mailbox->has(MailboxType::coe) && mailbox->pdo_assign) return;
+        std::vector<std::uint16_t> wanted;
+        for (const master::Pdo& p : sm.pdos) {
+            wanted.push_back(p.index);
+        }
+        const auto fixed = assigned_by_default(context_, output_, sm.number);
+        if (wanted == fixed) return;
+        error("the assignment of sync manager " + std::to_string(sm.number) + " of '" +
+                  context_.type + "' is fixed: " + (fixed.empty() ? "no PDO" : texts(fixed)),
+              "write " + key_ + " = default");
+    }
+
+    /// Terminals have PDOs with entries longer than their objects.
+    void check_entries(const master::SyncManager& sm) {
+        for (const master::Pdo& p : sm.pdos) {
+            const esi::Pdo* const described = context_.device.find_pdo(p.index);
+            if (described == nullptr || p.write_mapping) continue;
+            const std::string sentence = esi::longer_entry(context_.device, *described);
+            if (sentence.empty()) continue;
+            report_.warning(Topic::object, at_, sentence,
+                            "the bits of the PDO are exchanged; if its mapping is rejected, "
+                            "list the objects");
+        }
+    }
+
+    const PdoContext& context_;
+    const std::vector<master::SyncManager>& managers_;
+    bool output_;
+    const std::string& key_;
+    Span at_;
+    Report& report_;
+};
+
 }  // namespace
 
 std::string pdo_text(std::uint16_t index) { return bus::index_text(index).substr(2); }
@@ -120,60 +222,7 @@ std::vector<std::uint16_t> mappable(const esi::Device& device, bool output) {
 
 void check_pdos(const PdoContext& context, const std::vector<master::SyncManager>& managers,
                 bool output, const std::string& key, Span at, Report& report) {
-    const esi::Device& device = context.device;
-    const std::string& type = context.type;
-    const auto error = [&](std::string sentence, std::string help) {
-        report.error(Topic::object, at, std::move(sentence), std::move(help));
-    };
-    std::vector<const esi::Pdo*> assigned;
-    for (const auto& sm : managers) {
-        for (const auto& p : sm.pdos) {
-            if (const esi::Pdo* d = device.find_pdo(p.index)) {
-                assigned.push_back(d);
-            }
-        }
-    }
-    for (std::size_t i = 0; i < assigned.size(); ++i) {
-        for (std::size_t k = i + 1; k < assigned.size(); ++k) {
-            if (exclude_each_other(*assigned[i], *assigned[k])) {
-                error("PDOs " + pdo_text(assigned[i]->index) + " and " +
-                          pdo_text(assigned[k]->index) + " of '" + type + "' exclude each other",
-                      "assign only one of them");
-            }
-        }
-    }
-    for (const esi::Pdo& p : described(device, output)) {
-        if (p.mandatory && !is_assigned(managers, p.index)) {
-            error("PDO " + pdo_text(p.index) + " of '" + type + "' must be assigned",
-                  "write it as well: " + key + " = " + pdo_text(p.index));
-        }
-    }
-    const bool coe = device.mailbox && device.mailbox->has(MailboxType::coe);
-    for (const auto& sm : managers) {
-        if (const std::string sentence = too_long(context, sm); !sentence.empty()) {
-            error(sentence,
-                  context.samples > 1 ? "write a smaller number of samples" : "leave out objects");
-        }
-        std::vector<std::uint16_t> wanted;
-        for (const auto& p : sm.pdos) {
-            wanted.push_back(p.index);
-        }
-        const auto usual = assigned_by_default(context, output, sm.number);
-        if ((!coe || !device.mailbox->pdo_assign) && wanted != usual) {
-            error("the assignment of sync manager " + std::to_string(sm.number) + " of '" + type +
-                      "' is fixed: " + (usual.empty() ? "no PDO" : texts(usual)),
-                  "write " + key + " = default");
-        }
-        for (const auto& p : sm.pdos) {
-            const esi::Pdo* d = device.find_pdo(p.index);
-            if (d == nullptr || p.write_mapping) continue;
-            if (const std::string sentence = esi::longer_entry(device, *d); !sentence.empty()) {
-                report.warning(Topic::object, at, sentence,
-                               "the bits of the PDO are exchanged; if its mapping is rejected, "
-                               "list the objects");
-            }
-        }
-    }
+    PdoCheck(context, managers, output, key, at, report).run();
 }
 
 }  // namespace hal::ethercat::config
