@@ -101,68 +101,95 @@ bool read_count(Elaboration& on, const Token& token, const std::string& key,
     return false;
 }
 
-/// Separates the arguments of loadrt that name or count instances from the others. Returns false
-/// after reporting.
-bool read_request(Elaboration& on, const Token& name, Origin origin, Args args,
-                  LoadRequest& request) {
-    request.at = name.span;
-    request.on = &on;
-    request.faults = on.faults;
-    bool good = true;
-    Span names_at;
-    for (const Token& token : args) {
+/// Sorts the arguments of one loadrt: those that name or count instances, and the component's own.
+class RequestReader {
+public:
+    RequestReader(Elaboration& on, const Token& name, Origin origin, LoadRequest& request)
+        : on_(on), name_(name), origin_(origin), request_(request) {
+        request.at = name.span;
+        request.on = &on;
+        request.faults = on.faults;
+    }
+
+    /// Returns false after reporting.
+    bool read(Args args) {
+        bool good = true;
+        for (const Token& token : args) {
+            good = read_argument(token) && good;
+        }
+        return check_names_or_count() && good;
+    }
+
+private:
+    bool read_argument(const Token& token) {
         const auto equals = token.text.find('=');
         if (equals == std::string::npos || equals == 0) {
-            on.diagnostics.error("bad-argument", token.span,
-                                 hal::quoted(token.text) + " is not an argument", "",
-                                 "arguments are written NAME=VALUE, without blanks around the =");
-            good = false;
-            continue;
+            return error(token, hal::quoted(token.text) + " is not an argument", "",
+                         "arguments are written NAME=VALUE, without blanks around the =");
         }
         const std::string key = token.text.substr(0, equals);
-
         const std::string value = unquoted(token.text.substr(equals + 1));
-        const bool says_instances =
-            (key == "names" || key == "count" || key == "num_chan" || key == "personality") &&
-            !names_itself(on, name, origin);
-        if (says_instances && key == "names") {
-            request.names = split_list(value);
-            if (request.names.size() > 1 && request.names.back().empty()) {
-                request.names.pop_back();  // names=a,b, as real files have it
-            }
-            names_at = token.span;
-            for (const std::string& one : request.names) {
-                if (one.empty()) {
-                    on.diagnostics.error("bad-argument", token.span, "names= lists an empty name",
-                                         "", "write names=first,second without blanks");
-                    good = false;
-                } else {
-                    good = on.edit.check_name("instance", {one, token.span}) && good;
-                }
-            }
-        } else if (says_instances && key != "personality") {
-            if (!read_count(on, token, key, value, request)) {
-                good = false;
-            }
-        } else if (says_instances) {
-            request.personalities = split_list(value);
-        } else if (!request.arguments.emplace(key, GivenArgument{value, token.span}).second) {
-            on.diagnostics.error("bad-argument", token.span,
-                                 "argument '" + key + "' is given twice", "second time");
-            good = false;
+        const bool is_of_loadrt =
+            key == "names" || key == "count" || key == "num_chan" || key == "personality";
+        if (!is_of_loadrt || names_itself(on_, name_, origin_)) {
+            return read_own(token, key, value);
         }
+        if (key == "names") return read_names(token, value);
+        if (key == "personality") {
+            request_.personalities = split_list(value);
+            return true;
+        }
+        return read_count(on_, token, key, value, request_);
     }
-    if (!request.names.empty() && request.count >= 0) {
+
+    bool read_names(const Token& token, const std::string& value) {
+        names_at_ = token.span;
+        request_.names = split_list(value);
+        if (request_.names.size() > 1 && request_.names.back().empty()) {
+            request_.names.pop_back();  // names=a,b, as real files have it
+        }
+        bool good = true;
+        for (const std::string& one : request_.names) {
+            if (one.empty()) {
+                good = error(token, "names= lists an empty name", "",
+                             "write names=first,second without blanks");
+            } else {
+                good = on_.edit.check_name("instance", {one, token.span}) && good;
+            }
+        }
+        return good;
+    }
+
+    bool read_own(const Token& token, const std::string& key, const std::string& value) {
+        const bool is_new =
+            request_.arguments.emplace(key, GivenArgument{value, token.span}).second;
+        return is_new || error(token, "argument '" + key + "' is given twice", "second time");
+    }
+
+    bool check_names_or_count() {
+        if (request_.names.empty() || request_.count < 0) return true;
         Diagnostic d{Severity::error,
                      "names-and-count",
                      "names= and count= are both given",
-                     {{request.count_at, "how many"}, {names_at, "and which"}},
+                     {{request_.count_at, "how many"}, {names_at_, "and which"}},
                      {"remove count=; names= also gives the number of instances"}};
-        on.diagnostics.add(std::move(d));
-        good = false;
+        on_.diagnostics.add(std::move(d));
+        return false;
     }
-    return good;
-}
+
+    /// Always returns false.
+    bool error(const Token& token, const std::string& message, const std::string& label,
+               const std::string& help = "") {
+        on_.diagnostics.error("bad-argument", token.span, message, label, help);
+        return false;
+    }
+
+    Elaboration& on_;
+    const Token& name_;
+    Origin origin_;
+    LoadRequest& request_;
+    Span names_at_;
+};
 
 /// Returns false after reporting what stands against loading a component that is loaded already.
 bool may_load_again(Elaboration& on, const Token& name, Origin origin,
@@ -413,7 +440,7 @@ void edits::loadrt(Elaboration& on, Args args) {
     const bool known = on.model.find_component(name.text) || !on.plugins.find(name.text).empty();
     const auto cause = accepted_absence(on, name, origin, known);
     const std::size_t before = on.diagnostics.all().size();
-    const bool readable = read_request(on, name, origin, arguments, request);
+    const bool readable = RequestReader(on, name, origin, request).read(arguments);
     if (readable && !cause && make_instances(on, name, origin, request, text)) return;
     if (readable && describe_module(on, name, request, text)) {
         if (cause) {
