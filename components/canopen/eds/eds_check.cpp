@@ -166,6 +166,110 @@ private:
     unsigned node_;
 };
 
+/// Adds the objects of one connected module to those of its bus coupler, CiA 306-1 "Modular
+/// devices".
+class ModuleConnection {
+public:
+    ModuleConnection(DeviceDescription& device, const Module& module,
+                     std::vector<Message>& messages)
+        : objects_(device.objects), module_(module), messages_(messages) {}
+
+    void run() {
+        for (const Object& fixed : module_.fixed) {
+            Object& there = object(fixed.index, fixed);
+            if (there.entries.size() <= 1 && there.type == ObjectType::array) {
+                there = fixed;
+            }
+        }
+        for (const SubExtension& extension : module_.extensions) {
+            extend(extension);
+        }
+    }
+
+private:
+    static constexpr unsigned max_sub = 0xFE;
+
+    /// Returns the object with this index, which is made when the device has none.
+    Object& object(std::uint16_t index, const Object& like) {
+        const auto at =
+            std::lower_bound(objects_.begin(), objects_.end(), index,
+                             [](const Object& o, std::uint16_t i) { return o.index < i; });
+        if (at != objects_.end() && at->index == index) return *at;
+        return *objects_.insert(at, empty_array(index, like));
+    }
+
+    static Object empty_array(std::uint16_t index, const Object& like) {
+        Entry first;
+        first.name = "Highest sub-index supported";
+        first.data_type = 0x05;
+        first.access = Access::ro;
+        first.default_value = "0";
+        first.at = like.at;
+        const bool is_manufacturers = index >= 0x2000 && index < 0x6000;
+        Object made;
+        made.index = index;
+        made.name = like.name;
+        made.at = like.at;
+        made.type = ObjectType::array;
+        made.category = is_manufacturers ? Category::manufacturer : Category::optional;
+        made.entries.push_back(std::move(first));
+        return made;
+    }
+
+    static bool is_full(const Object& object) { return object.entries.back().sub >= max_sub; }
+
+    /// Adds `Count` sub-indices; with `ObjExtend` the next object takes what the first has no
+    /// sub-index for.
+    void extend(const SubExtension& extension) {
+        const auto count = parse_number(extension.count);
+        if (!count || count->node_id || count->magnitude == 0 || count->magnitude > max_sub) {
+            report_count(extension);
+            return;
+        }
+        const auto next = parse_number(extension.object_extend);
+        const bool may_continue = next && next->magnitude != 0;
+        std::uint16_t index = extension.object.index;
+        for (std::uint64_t i = 0; i < count->magnitude; ++i) {
+            while (is_full(object(index, extension.object)) && may_continue && index < 0xFFFF) {
+                ++index;
+            }
+            Object& to = object(index, extension.object);
+            if (is_full(to)) {
+                report_full(extension, index);
+                return;
+            }
+            append(to, extension.object.entries.at(0));
+        }
+    }
+
+    static void append(Object& object, Entry entry) {
+        entry.sub = static_cast<std::uint8_t>(object.entries.back().sub + 1);
+        object.entries.push_back(std::move(entry));
+        if (Entry* const highest = object.find(0)) {
+            highest->default_value = std::to_string(object.entries.back().sub);
+        }
+    }
+
+    void report_count(const SubExtension& extension) {
+        messages_.push_back({Severity::warning, Topic::value, extension.object.at,
+                             "'Count' of module " + std::to_string(module_.number) + " for " +
+                                 label(extension.object.index) + " is not a plain number: '" +
+                                 extension.count + "'",
+                             "its sub-indices were not added"});
+    }
+
+    void report_full(const SubExtension& extension, std::uint16_t index) {
+        messages_.push_back({Severity::warning, Topic::count, extension.object.at,
+                             "object " + label(index) + " has no free sub-index for module " +
+                                 std::to_string(module_.number),
+                             ""});
+    }
+
+    std::vector<Object>& objects_;
+    const Module& module_;
+    std::vector<Message>& messages_;
+};
+
 }  // namespace
 
 std::string misfit(const DeviceDescription& dcf, unsigned node_id, std::uint32_t bit_rate) {
@@ -195,75 +299,11 @@ void check_objects(const DeviceDescription& description, std::vector<Message>& m
 }
 
 void connect_modules(DeviceDescription& d, std::vector<Message>& messages) {
-    const auto object_of = [&](std::uint16_t index, const Object& like) -> Object& {
-        const auto at =
-            std::lower_bound(d.objects.begin(), d.objects.end(), index,
-                             [](const Object& o, std::uint16_t i) { return o.index < i; });
-        if (at != d.objects.end() && at->index == index) return *at;
-        Object made;
-        made.index = index;
-        made.name = like.name;
-        made.at = like.at;
-        made.type = ObjectType::array;
-        made.category =
-            index >= 0x2000 && index < 0x6000 ? Category::manufacturer : Category::optional;
-        Entry first;
-        first.name = "Highest sub-index supported";
-        first.data_type = 0x05;
-        first.access = Access::ro;
-        first.default_value = "0";
-        first.at = like.at;
-        made.entries.push_back(first);
-        return *d.objects.insert(at, std::move(made));
-    };
     for (const unsigned number : d.connected_modules) {
         const auto module = std::find_if(d.modules.begin(), d.modules.end(),
                                          [&](const Module& m) { return m.number == number; });
-        if (module == d.modules.end()) {
-            continue;  // reported by the reader
-        }
-        for (const Object& fixed : module->fixed) {
-            Object& there = object_of(fixed.index, fixed);
-            if (there.entries.size() <= 1 && there.type == ObjectType::array) {
-                there = fixed;
-            }
-        }
-        for (const SubExtension& extension : module->extensions) {
-            const auto count = parse_number(extension.count);
-            if (!count || count->node_id || count->magnitude == 0 || count->magnitude > 0xFE) {
-                messages.push_back({Severity::warning, Topic::value, extension.object.at,
-                                    "'Count' of module " + std::to_string(number) + " for " +
-                                        label(extension.object.index) +
-                                        " is not a plain number: '" + extension.count + "'",
-                                    "its sub-indices were not added"});
-                continue;
-            }
-            const Entry& each = extension.object.entries.at(0);
-            std::uint16_t index = extension.object.index;
-            const auto next = parse_number(extension.object_extend);
-            for (std::uint64_t i = 0; i < count->magnitude; ++i) {
-                Object* object = &object_of(index, extension.object);
-                // Full: continue with the next object, if the module has ObjExtend.
-                while (object->entries.back().sub >= 0xFE && next && next->magnitude != 0 &&
-                       index < 0xFFFF) {
-                    object = &object_of(++index, extension.object);
-                }
-                if (object->entries.back().sub >= 0xFE) {
-                    messages.push_back({Severity::warning, Topic::count, extension.object.at,
-                                        "object " + label(index) +
-                                            " has no free sub-index for module " +
-                                            std::to_string(number),
-                                        ""});
-                    break;
-                }
-                Entry made = each;
-                made.sub = static_cast<std::uint8_t>(object->entries.back().sub + 1);
-                object->entries.push_back(std::move(made));
-                if (Entry* first = object->find(0)) {
-                    first->default_value = std::to_string(object->entries.back().sub);
-                }
-            }
-        }
+        if (module == d.modules.end()) continue;  // reported by the reader
+        ModuleConnection(d, *module, messages).run();
     }
 }
 

@@ -297,6 +297,68 @@ std::vector<std::uint8_t> utf16(std::string_view text) {
     return out;
 }
 
+/// A sum of numbers and at most one `$NODEID`, CiA 306-1: "$NODEID+0x180", "-5", "0x200 - 1".
+class NumberParser {
+public:
+    explicit NumberParser(std::string_view text) : rest_(trimmed(text)) {}
+
+    std::optional<Number> parse() {
+        accept_sign();  // the only place of a sign that follows no term
+        if (!parse_term()) return std::nullopt;
+        while (!rest_.empty()) {
+            if (!accept_sign() || !parse_term()) return std::nullopt;
+        }
+        return sum_;
+    }
+
+private:
+    bool accept_sign() {
+        minus_ = false;
+        if (rest_.empty() || (rest_[0] != '+' && rest_[0] != '-')) return false;
+        minus_ = rest_[0] == '-';
+        rest_ = trimmed(rest_.substr(1));
+        return true;
+    }
+
+    bool parse_term() {
+        const std::size_t stop = std::min(rest_.find_first_of("+- \t"), rest_.size());
+        const std::string_view word = rest_.substr(0, stop);
+        rest_ = trimmed(rest_.substr(stop));
+        if (same_word(word, "$NODEID")) return add_node_id();
+        const auto one = term(word);
+        return one && add(*one);
+    }
+
+    bool add_node_id() {
+        if (sum_.node_id || minus_) return false;
+        sum_.node_id = true;
+        return true;
+    }
+
+    /// Returns false when the sum has more than 64 bits.
+    bool add(const Term& one) {
+        sum_.hex = sum_.hex || one.hex;
+        if (one.spelling != Spelling::plain) {
+            sum_.spelling = one.spelling;
+        }
+        if (sum_.negative == minus_ || sum_.magnitude == 0) {
+            sum_.negative = minus_;
+            return !__builtin_add_overflow(sum_.magnitude, one.value, &sum_.magnitude);
+        }
+        if (sum_.magnitude >= one.value) {
+            sum_.magnitude -= one.value;
+            return true;
+        }
+        sum_.magnitude = one.value - sum_.magnitude;
+        sum_.negative = minus_;
+        return true;
+    }
+
+    std::string_view rest_;
+    bool minus_ = false;  // of the term that follows
+    Number sum_;
+};
+
 }  // namespace
 
 std::span<const DataType> data_types() { return table; }
@@ -307,71 +369,7 @@ const DataType* data_type(std::string_view name) {
     return find_row_if(table, [&](const DataType& type) { return same_word(type.name, name); });
 }
 
-std::optional<Number> parse_number(std::string_view text) {
-    constexpr std::string_view node = "$NODEID";
-    Number out;
-    bool any = false;
-    bool minus_next = false;
-    bool sign_seen = true;
-    text = trimmed(text);
-    for (std::string_view rest = text; !rest.empty() || sign_seen;) {
-        rest = trimmed(rest);
-        if (rest.empty()) {
-            return {};
-        }
-        if (!any || sign_seen) {
-            if (rest[0] == '+' || rest[0] == '-') {
-                if (any) {
-                    return {};  // "1 + -2"
-                }
-                minus_next = rest[0] == '-';
-                rest = trimmed(rest.substr(1));
-            }
-            const std::size_t stop = std::min(rest.find_first_of("+- \t"), rest.size());
-            const std::string_view word = rest.substr(0, stop);
-            if (same_word(word, node)) {
-                if (out.node_id || minus_next) {
-                    return {};
-                }
-                out.node_id = true;
-            } else {
-                const auto one = term(word);
-                if (!one) {
-                    return {};
-                }
-                out.hex = out.hex || one->hex;
-                if (one->spelling != Spelling::plain) {
-                    out.spelling = one->spelling;
-                }
-                if (out.negative == minus_next || out.magnitude == 0) {
-                    if (__builtin_add_overflow(out.magnitude, one->value, &out.magnitude)) {
-                        return {};
-                    }
-                    out.negative = minus_next;
-                } else if (out.magnitude >= one->value) {
-                    out.magnitude -= one->value;
-                } else {
-                    out.magnitude = one->value - out.magnitude;
-                    out.negative = minus_next;
-                }
-            }
-            any = true;
-            sign_seen = false;
-            rest = trimmed(rest.substr(stop));
-            continue;
-        }
-        if (rest[0] != '+' && rest[0] != '-') {
-            return {};
-        }
-        minus_next = rest[0] == '-';
-        sign_seen = true;
-        rest = trimmed(rest.substr(1));
-    }
-    if (!any) {
-        return {};
-    }
-    return out;
-}
+std::optional<Number> parse_number(std::string_view text) { return NumberParser(text).parse(); }
 
 std::optional<double> parse_real(std::string_view text) {
     text = trimmed(text);

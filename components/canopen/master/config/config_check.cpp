@@ -102,85 +102,131 @@ void date_by_content(NodeSetup& node) {
     node.configuration_time = static_cast<std::uint32_t>((sum >> 20) % day_ms);
 }
 
-void check_network(const MasterConfig& config, Report& report) {
+namespace {
+
+/// The rules for the PDOs and SRDOs of all nodes together.
+class NetworkCheck {
+public:
+    NetworkCheck(const MasterConfig& config, Report& report) : config_(config), report_(report) {}
+
+    void run() {
+        for (const Node& node : config_.nodes) {
+            for (const Pdo& pdo : node.pdos) {
+                const User user{&node, &pdo};
+                count(user);
+                check_identifier(user);
+                users_.emplace(identifier(pdo), user);
+            }
+        }
+        check_foreign();
+        check_counts();
+    }
+
+private:
     struct User {
         const Node* node;
         const Pdo* pdo;
     };
-    constexpr std::size_t max_multiplexed = 48 * 254;  // rows of 1FD0h to 1FFFh
-    std::size_t multiplexed = 0;
-    std::multimap<std::uint32_t, User> users;
-    unsigned sent = 0;
-    unsigned received = 0;
-    unsigned safety = 0;
-    const auto called = [](const User& u) {
-        const std::string direction = u.pdo->to_node ? "r" : "t";
-        const std::string kind = u.pdo->safety ? "srdo" : "pdo";
-        return direction + kind + std::to_string(u.pdo->number) + " of '" + u.node->name + "'";
-    };
-    for (const Node& n : config.nodes) {
-        for (const Pdo& p : n.pdos) {
-            const std::uint32_t cob = p.cob & (cob_extended | 0x1fffffff);
-            if (p.multiplexed() && !p.to_node) {
-                multiplexed += p.objects.size();
-            }
-            if (p.safety) {
-                ++safety;
-            } else if (!p.to_node) {
-                ++received;
-            } else {
-                sent += !users.contains(cob);
-            }
-            const auto [first, last] = users.equal_range(cob);
-            for (auto u = first; u != last; ++u) {
-                const std::string why = why_not_shared(*u->second.pdo, p);
-                if (why.empty()) continue;
-                report.error(Topic::node, p.at,
-                             called({&n, &p}) + " and " + called(u->second) +
-                                 " have the same identifier " +
-                                 lower(index_text(static_cast<std::uint16_t>(cob_id(p.cob)))),
-                             why);
-                break;
-            }
-            users.emplace(cob, User{&n, &p});
+
+    static std::uint32_t identifier(const Pdo& pdo) {
+        return pdo.cob & (cob_extended | 0x1fffffff);
+    }
+
+    static std::string label(const User& user) {
+        const std::string direction = user.pdo->to_node ? "r" : "t";
+        const std::string kind = user.pdo->safety ? "srdo" : "pdo";
+        return direction + kind + std::to_string(user.pdo->number) + " of '" + user.node->name +
+               "'";
+    }
+
+    /// One frame of the master may serve several nodes.
+    void count(const User& user) {
+        const Pdo& pdo = *user.pdo;
+        if (pdo.multiplexed() && !pdo.to_node) {
+            multiplexed_ += pdo.objects.size();
+        }
+        if (pdo.safety) {
+            ++safety_;
+        } else if (!pdo.to_node) {
+            ++received_;
+        } else if (!users_.contains(identifier(pdo))) {
+            ++sent_;
         }
     }
-    for (std::size_t i = 0; i < config.foreign.size(); ++i) {
-        for (std::size_t k = 0; k < i; ++k) {
-            if (config.foreign[i].id == config.foreign[k].id &&
-                config.foreign[i].extended == config.foreign[k].extended &&
-                config.foreign[i].remote == config.foreign[k].remote) {
-                report.error(Topic::node, config.foreign[i].at,
-                             "duplicate identifier: also used in line " +
-                                 std::to_string(config.foreign[k].at.line),
-                             "two senders of one identifier destroy each other's frames");
+
+    /// Reports the first of the earlier users with which the identifier cannot be shared.
+    void check_identifier(const User& user) {
+        const auto [first, last] = users_.equal_range(identifier(*user.pdo));
+        for (auto other = first; other != last; ++other) {
+            const std::string why = why_not_shared(*other->second.pdo, *user.pdo);
+            if (why.empty()) continue;
+            const auto cob = static_cast<std::uint16_t>(cob_id(user.pdo->cob));
+            report_.error(Topic::node, user.pdo->at,
+                          label(user) + " and " + label(other->second) +
+                              " have the same identifier " + lower(index_text(cob)),
+                          why);
+            return;
+        }
+    }
+
+    static bool is_same_frame(const Foreign& a, const Foreign& b) {
+        return a.id == b.id && a.extended == b.extended && a.remote == b.remote;
+    }
+
+    void check_foreign() {
+        const auto& foreign = config_.foreign;
+        for (std::size_t i = 0; i < foreign.size(); ++i) {
+            for (std::size_t k = 0; k < i; ++k) {
+                if (!is_same_frame(foreign[i], foreign[k])) continue;
+                report_.error(
+                    Topic::node, foreign[i].at,
+                    "duplicate identifier: also used in line " + std::to_string(foreign[k].at.line),
+                    "two senders of one identifier destroy each other's frames");
             }
         }
     }
-    for (const unsigned count : {sent, received}) {
-        if (count > 512) {
-            report.error(Topic::node, config.at,
-                         "the nodes have " + std::to_string(count) +
-                             " PDOs in one direction; the limit is 512",
-                         "move some nodes to a second bus with its own configuration");
+
+    void check_counts() {
+        constexpr std::size_t max_pdos = 512;
+        constexpr std::size_t max_multiplexed = 48 * 254;  // rows of 1FD0h to 1FFFh
+        for (const std::size_t count : {sent_, received_}) {
+            if (count > max_pdos) {
+                exceeded("have " + std::to_string(count) + " PDOs in one direction", max_pdos);
+            }
+        }
+        if (multiplexed_ > max_multiplexed) {
+            exceeded("send " + std::to_string(multiplexed_) + " objects in multiplexed PDOs",
+                     max_multiplexed);
+        }
+        if (safety_ > Srdos::max_srdos) {
+            report_.error(Topic::node, config_.at,
+                          "the nodes have " + std::to_string(safety_) +
+                              " SRDOs; the limit of a bus is " + std::to_string(Srdos::max_srdos));
         }
     }
-    if (multiplexed > max_multiplexed) {
-        report.error(Topic::node, config.at,
-                     "the nodes send " + std::to_string(multiplexed) +
-                         " objects in multiplexed PDOs; the limit is " +
-                         std::to_string(max_multiplexed),
-                     "move some nodes to a second bus with its own configuration");
+
+    void exceeded(const std::string& what, std::size_t limit) {
+        report_.error(Topic::node, config_.at,
+                      "the nodes " + what + "; the limit is " + std::to_string(limit),
+                      "move some nodes to a second bus with its own configuration");
     }
-    if (safety > Srdos::max_srdos) {
-        report.error(
-            Topic::node, config.at,
-            "the nodes have " + std::to_string(safety) + " SRDOs; the limit of a bus is 64");
-    }
-    if (!report.failed()) {
-        for (const std::string& problem : problems_of(config.setup())) {
-            report.error(Topic::node, config.at, problem);
-        }
+
+    const MasterConfig& config_;
+    Report& report_;
+    std::multimap<std::uint32_t, User> users_;
+    std::size_t sent_ = 0;
+    std::size_t received_ = 0;
+    std::size_t multiplexed_ = 0;
+    std::size_t safety_ = 0;
+};
+
+}  // namespace
+
+void check_network(const MasterConfig& config, Report& report) {
+    NetworkCheck(config, report).run();
+    if (report.failed()) return;
+    for (const std::string& problem : problems_of(config.setup())) {
+        report.error(Topic::node, config.at, problem);
     }
 }
 
