@@ -108,74 +108,102 @@ std::vector<LinePoint> agreeing(const std::vector<LinePoint>& points, const Para
     return those;
 }
 
-}  // namespace
-
-LineSeen find_line(const Frame& frame, const Ground& ground, const LineRules& rules) {
-    LineSeen seen;
+cv::Mat grey_of(const Frame& frame) {
     const cv::Mat picture(frame.height, frame.width,
                           frame.format == Format::grey ? CV_8UC1 : CV_8UC3,
                           const_cast<std::uint8_t*>(frame.pixels.data()));
-    cv::Mat grey = picture;
-    if (frame.format == Format::bgr) {
-        cv::cvtColor(picture, grey, cv::COLOR_BGR2GRAY);
-    }
+    if (frame.format != Format::bgr) return picture;
+    cv::Mat grey;
+    cv::cvtColor(picture, grey, cv::COLOR_BGR2GRAY);
+    return grey;
+}
 
-    // from the lowest row to where the reach ends, or a line of the width has fewer than three
-    // pixels
-    const int bands = std::clamp(rules.bands, 3, 32);
-    int top = frame.height - 1;
+/// Returns the uppermost row that is examined: from the lowest row to where the reach ends, or
+/// where the width of a line has fewer than three pixels.
+int top_row(const Frame& frame, const Ground& ground, const LineRules& rules) {
+    const double middle = 0.5 * frame.width;
     double x = 0.0;
     double y = 0.0;
     double x2 = 0.0;
     double y2 = 0.0;
-    while (top > 0 && place(ground, 0.5 * frame.width, top - 1, x, y) &&
-           place(ground, 0.5 * frame.width + 3.0, top - 1, x2, y2) &&
-           std::hypot(x2 - x, y2 - y) < rules.width && x < rules.reach) {
-        --top;
+    for (int top = frame.height - 1; top > 0; --top) {
+        const bool is_ground =
+            place(ground, middle, top - 1, x, y) && place(ground, middle + 3.0, top - 1, x2, y2);
+        if (!is_ground || x >= rules.reach || std::hypot(x2 - x, y2 - y) >= rules.width) return top;
     }
-    const int each = (frame.height - top) / bands;
-    if (each < 1) return seen;
-    std::vector<LinePoint> points;
-    for (int band = 0; band < bands; ++band) {
-        const int middle = frame.height - 1 - band * each - each / 2;
-        const int half = std::min(each / 2, 2);
-        const int first = std::max(middle - half, 0);
+    return 0;
+}
 
-        const int last = std::min(middle + half, frame.height - 1);
-        std::vector<float> row(static_cast<std::size_t>(frame.width), 0.0F);
-        for (int v = first; v <= last; ++v) {
-            for (int u = 0; u < frame.width; ++u) {
-                row[static_cast<std::size_t>(u)] +=
-                    static_cast<float>(grey.at<std::uint8_t>(v, u)) /
-                    static_cast<float>(last - first + 1);
-            }
+/// The mean of the rows `first` to `last`.
+std::vector<float> mean_row(const cv::Mat& grey, int first, int last) {
+    std::vector<float> row(static_cast<std::size_t>(grey.cols), 0.0F);
+    for (int v = first; v <= last; ++v) {
+        for (int u = 0; u < grey.cols; ++u) {
+            row[static_cast<std::size_t>(u)] += static_cast<float>(grey.at<std::uint8_t>(v, u)) /
+                                                static_cast<float>(last - first + 1);
         }
-        look(row, 0.5 * (first + last), band, ground, rules, points);
     }
+    return row;
+}
 
-    const double tolerance = 0.5 * rules.width;
-    std::vector<LinePoint> best;
+/// The points of a line in bands of `height` rows, from the lowest band up.
+std::vector<LinePoint> points_in_bands(const cv::Mat& grey, int bands, int height,
+                                       const Ground& ground, const LineRules& rules) {
+    std::vector<LinePoint> points;
+    const int half = std::min(height / 2, 2);
+    for (int band = 0; band < bands; ++band) {
+        const int middle = grey.rows - 1 - band * height - height / 2;
+        const int first = std::max(middle - half, 0);
+        const int last = std::min(middle + half, grey.rows - 1);
+        look(mean_row(grey, first, last), 0.5 * (first + last), band, ground, rules, points);
+    }
+    return points;
+}
+
+/// Returns the points that agree with a parabola through `three`; none when that cannot be a line.
+std::vector<LinePoint> supporters(const std::vector<LinePoint>& three,
+                                  const std::vector<LinePoint>& points, const LineRules& rules) {
+    constexpr double max_slope = 3.0;
+    constexpr double max_bend = 5.0;  // 1/m
     Parabola through;
+    if (!fit(three, rules.ahead, through)) return {};
+    if (std::fabs(through.c) > max_bend || std::fabs(through.b) > max_slope) return {};
+    return agreeing(points, through, rules.ahead, 0.5 * rules.width);
+}
+
+/// Returns the largest set of points on one parabola, found from each three of different bands.
+std::vector<LinePoint> consensus(const std::vector<LinePoint>& points, const LineRules& rules) {
+    std::vector<LinePoint> best;
     for (std::size_t i = 0; i < points.size(); ++i) {
         for (std::size_t j = i + 1; j < points.size(); ++j) {
+            if (points[i].band == points[j].band) continue;
             for (std::size_t k = j + 1; k < points.size(); ++k) {
-                if (points[i].band == points[j].band || points[j].band == points[k].band) continue;
-                if (!fit({points[i], points[j], points[k]}, rules.ahead, through) ||
-                    std::fabs(through.c) > 5.0 || std::fabs(through.b) > 3.0) {
-                    continue;
-                }
-                if (auto those = agreeing(points, through, rules.ahead, tolerance);
-                    those.size() > best.size()) {
-                    best = std::move(those);
+                if (points[j].band == points[k].band) continue;
+                auto found = supporters({points[i], points[j], points[k]}, points, rules);
+                if (found.size() > best.size()) {
+                    best = std::move(found);
                 }
             }
         }
     }
+    return best;
+}
+
+}  // namespace
+
+LineSeen find_line(const Frame& frame, const Ground& ground, const LineRules& rules) {
+    LineSeen seen;
+    const int bands = std::clamp(rules.bands, 3, 32);
+    const int band_height = (frame.height - top_row(frame, ground, rules)) / bands;
+    if (band_height < 1) return seen;
+    const auto points = points_in_bands(grey_of(frame), bands, band_height, ground, rules);
+    std::vector<LinePoint> best = consensus(points, rules);
     seen.quality = static_cast<double>(best.size()) / bands;
-    if (!fit(best, rules.ahead, through)) return seen;
-    seen.offset = through.a;
-    seen.heading = std::atan(through.b);
-    seen.curvature = 2.0 * through.c / std::pow(1.0 + through.b * through.b, 1.5);
+    Parabola line;
+    if (!fit(best, rules.ahead, line)) return seen;
+    seen.offset = line.a;
+    seen.heading = std::atan(line.b);
+    seen.curvature = 2.0 * line.c / std::pow(1.0 + line.b * line.b, 1.5);
     seen.points = std::move(best);
     seen.found = seen.quality >= rules.min_quality;
     return seen;
