@@ -175,6 +175,124 @@ int execute(Cell& cell, const NodeCommand& command, const StopRequest& stop, Out
     return status;
 }
 
+/// Returns which option applies to one machine only, with what to use for several; "" when none.
+std::string problem_of(const SimOptions& options, const std::vector<NodeLine>& nodes) {
+    if (options.cycles != 0) {
+        return "--cycles applies to one machine; for several use --for 10s";
+    }
+    if (!options.name.empty()) {
+        return "--name applies to one machine; select it: --node " + nodes.front().name;
+    }
+    if (!options.show.empty()) {
+        return "--show applies to one machine; for several use --execute 'NODE: getp NAME'";
+    }
+    return "";
+}
+
+/// The machines of a netlist with nodes, simulated together.
+class CellSimulation {
+public:
+    /// `options` outlives it.
+    CellSimulation(const SimOptions& options, std::vector<NodeLine> nodes)
+        : options_(options),
+          cell_(cell_name(options.words), std::move(nodes), session_options(), how()) {
+        guard_.begin(options.cycle_limit_ns);
+        stop_.when_signalled([this] {
+            for (std::size_t i = 0; i < cell_.size(); ++i) {
+                cell_.shell(i).cancel();
+            }
+            guard_.end_soon();
+        });
+    }
+
+    /// Simulates the time of --for, then executes the commands. Returns the exit status.
+    int run(const std::vector<NodeCommand>& commands) {
+        const bool started = start();
+        const auto begun = std::chrono::steady_clock::now();
+        if (started) {
+            advance(cell_, options_.for_ns, stop_);
+        }
+        const auto wall = std::chrono::steady_clock::now() - begun;
+        int status = started ? execute_all(commands) : 1;
+        if (started && !options_.report && summary_wanted(options_, output_.printed)) {
+            print_summary(wall);
+        }
+        if (has_faulted_thread()) {
+            status = 1;
+        }
+        if (options_.report) {
+            print_reports();
+        }
+        stop_.release();
+        return stop_.requested() ? 1 : status;
+    }
+
+private:
+    SessionOptions session_options() const {
+        SessionOptions session;
+        session.name = fmt::format("sim-{}", ::getpid());
+        session.virtual_clock = true;
+        session.wait_limit_ns = options_.cycle_limit_ns;
+        return session;
+    }
+
+    ShellOptions how() const {
+        ShellOptions how = shell_options(options_);
+        how.shared_time = options_.part.empty();
+        return how;
+    }
+
+    bool start() {
+        const bool started =
+            cell_.load(options_.words, options_.ini, output_) && cell_.start(output_);
+        if (!options_.part.empty()) {
+            cell_.isolate(cell_.find(options_.part));
+        }
+        return started;
+    }
+
+    /// Ends with the first command that fails.
+    int execute_all(const std::vector<NodeCommand>& commands) {
+        for (const NodeCommand& command : commands) {
+            if (stop_.requested()) break;
+            if (const int status = execute(cell_, command, stop_, output_); status != 0) {
+                return status;
+            }
+        }
+        return 0;
+    }
+
+    void print_summary(std::chrono::steady_clock::duration wall) {
+        if (cell_.size() == 0) return;
+        write_all(STDERR_FILENO, simulated_for(cell_.session(0).threads().now_ns(), wall) + "\n");
+        for (std::size_t i = 0; i < cell_.size(); ++i) {
+            const std::string title = "node " + cell_.nodes()[i].name;
+            write_all(STDERR_FILENO, simulated_summary(cell_.session(i), title));
+        }
+    }
+
+    bool has_faulted_thread() {
+        for (std::size_t i = 0; i < cell_.size(); ++i) {
+            const auto threads = cell_.session(i).reports().threads();
+            if (std::ranges::any_of(threads, &ThreadReport::faulted)) return true;
+        }
+        return false;
+    }
+
+    void print_reports() {
+        for (std::size_t i = 0; i < cell_.size(); ++i) {
+            write_all(STDERR_FILENO, fmt::format("node {}\n{}", cell_.nodes()[i].name,
+                                                 timing_report(cell_.session(i))));
+        }
+    }
+
+    const SimOptions& options_;
+    StopRequest stop_;
+    CycleGuard guard_;
+    TrackedOutput output_;
+    Cell cell_;
+};
+
 }  // namespace
 
 std::optional<std::vector<NodeLine>> requested_nodes(const NetlistOptions& options) {
@@ -221,73 +339,12 @@ int check_cell(const NetlistOptions& options, std::vector<NodeLine> nodes) {
 }
 
 int sim_cell(const SimOptions& options, std::vector<NodeLine> nodes) {
-    if (options.cycles != 0) {
-        return fail(options, "--cycles applies to one machine; for several use --for 10s");
-    }
-    if (!options.name.empty()) {
-        return fail(options,
-                    "--name applies to one machine; select it: --node " + nodes.front().name);
-    }
+    const std::string problem = problem_of(options, nodes);
+    if (!problem.empty()) return fail(options, problem);
     export_variables(options, "sim");
-    StopRequest stop;
-    CycleGuard guard;
-    guard.begin(options.cycle_limit_ns);
-    SessionOptions session;
-    session.name = fmt::format("sim-{}", ::getpid());
-    session.virtual_clock = true;
-    session.wait_limit_ns = options.cycle_limit_ns;
-    if (!options.show.empty()) {
-        return fail(options,
-                    "--show applies to one machine; for several use --execute 'NODE: getp NAME'");
-    }
     const auto commands = node_commands(options, nodes);
     if (!commands) return 1;
-    TrackedOutput output;
-    const auto begun = std::chrono::steady_clock::now();
-    ShellOptions how = shell_options(options);
-    how.shared_time = options.part.empty();
-    Cell cell(cell_name(options.words), std::move(nodes), session, how);
-    stop.when_signalled([&guard, &cell] {
-        for (std::size_t i = 0; i < cell.size(); ++i) {
-            cell.shell(i).cancel();
-        }
-        guard.end_soon();
-    });
-    int status = cell.load(options.words, options.ini, output) && cell.start(output) ? 0 : 1;
-    if (!options.part.empty()) {
-        cell.isolate(cell.find(options.part));
-    }
-    if (status == 0) {
-        advance(cell, options.for_ns, stop);
-    }
-    const bool loaded = status == 0;
-    const auto wall = std::chrono::steady_clock::now() - begun;
-    for (const NodeCommand& command : *commands) {
-        if (status == 0 && !stop.requested()) {
-            status = execute(cell, command, stop, output);
-        }
-    }
-    if (loaded && !options.report && summary_wanted(options, output.printed) && cell.size() != 0) {
-        write_all(STDERR_FILENO, simulated_for(cell.session(0).threads().now_ns(), wall) + "\n");
-        for (std::size_t i = 0; i < cell.size(); ++i) {
-            write_all(
-                STDERR_FILENO,
-                simulated_summary(cell.session(i), fmt::format("node {}", cell.nodes()[i].name)));
-        }
-    }
-    for (std::size_t i = 0; i < cell.size(); ++i) {
-        const auto reports = cell.session(i).reports().threads();
-        if (std::any_of(reports.begin(), reports.end(),
-                        [](const ThreadReport& r) { return r.faulted; })) {
-            status = 1;
-        }
-        if (options.report) {
-            write_all(STDERR_FILENO, fmt::format("node {}\n{}", cell.nodes()[i].name,
-                                                 timing_report(cell.session(i))));
-        }
-    }
-    stop.release();
-    return stop.requested() ? 1 : status;
+    return CellSimulation(options, std::move(nodes)).run(*commands);
 }
 
 int load_node(HostedMachine& machine, const RunOptions& options, std::vector<NodeLine> nodes) {

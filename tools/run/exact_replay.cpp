@@ -110,54 +110,71 @@ private:
         return 0;
     }
 
+    /// How the execution ended: the lines that are printed, and whether that is a success.
+    struct Ending {
+        std::string text;
+        bool good = true;
+    };
+
     int report(bool stopped, std::chrono::steady_clock::duration took) {
-        const JournaledCycle& newest = execution_.newest();
-        const double real = std::max(std::chrono::duration<double>(took).count(), 1e-9);
-        std::string text = fmt::format(
-            "{} of {}, {} and {:.6g} s executed in {:.3g} s; {}\n",
-            counted(execution_.cycles(), "cycle"), counted(file_.threads().size(), "thread"),
-            counted(execution_.edits(), "edit"), seconds(newest.time_ns), real, newest_cycle());
+        std::string text = summary(took);
         note_overlaps();
         const std::string difference = machine_.difference();
-        const bool is_cut = !difference.empty() && execution_.is_at_the_cut();
-        const bool differs = !difference.empty() && !is_cut;
-        bool good = !differs;
-        if (is_cut) {
-            text += fmt::format(
-                "the journal ends: it was cut off, and an edit or a value that cycle "
-                "{} of thread '{}' depends on may be missing; no difference "
-                "before\n",
-                newest.number, newest.thread);
-        } else if (differs) {
-            text += difference;
-        } else if (!machine_.change_problem().empty()) {
-            good = false;
-            text += fmt::format("{}: {}\n",
-                                machine_.change().netlist().empty() ? "--edit" : "--netlist",
-                                machine_.change_problem());
-        } else if (execution_.state() == ReExecution::State::fails) {
-            good = false;
-            text += execution_.reason() + "\n";
-        } else if (execution_.state() == ReExecution::State::ends) {
-            good = !file_.complete() && !has_gap();
-            text += "the journal ends: " + execution_.reason();
-            text += machine_.change().done() ? "\n" : "; " + verdict("no difference before") + "\n";
-        } else if (!machine_.change().done()) {
-            text += verdict(stopped ? "stopped; no difference so far" : "no difference") + "\n";
-        }
-        text += machine_.consequences();
-        if (!machine_.change().empty() && !machine_.change().done() && !differs) {
-            note(options_, fmt::format("--at {}: the execution ended before it", options_.at));
-            good = false;
-        }
-        if (condition_.is_unknown(machine_.session())) {
+        const bool differs = !difference.empty() && !execution_.is_at_the_cut();
+        const Ending ending = ending_of(stopped, difference);
+        text += ending.text + machine_.consequences();
+        const bool changed = differs || note_missing_change();
+        const bool known = !condition_.is_unknown(machine_.session());
+        if (!known) {
             note(options_, fmt::format("--break: the machine has no '{}'", condition_.name()));
-            good = false;
         } else if (!stopped && !differs) {
             note_end();
         }
-        if (!print(text)) return 1;
-        return good ? 0 : 1;
+        return print(text) && ending.good && changed && known ? 0 : 1;
+    }
+
+    std::string summary(std::chrono::steady_clock::duration took) const {
+        const double real = std::max(std::chrono::duration<double>(took).count(), 1e-9);
+        return fmt::format("{} of {}, {} and {:.6g} s executed in {:.3g} s; {}\n",
+                           counted(execution_.cycles(), "cycle"),
+                           counted(file_.threads().size(), "thread"),
+                           counted(execution_.edits(), "edit"),
+                           seconds(execution_.newest().time_ns), real, newest_cycle());
+    }
+
+    Ending ending_of(bool stopped, const std::string& difference) const {
+        const WhatIf& change = machine_.change();
+        if (!difference.empty() && execution_.is_at_the_cut()) return {text_of_the_cut()};
+        if (!difference.empty()) return {difference, false};
+        if (!machine_.change_problem().empty()) {
+            const std::string option = change.netlist().empty() ? "--edit" : "--netlist";
+            return {option + ": " + machine_.change_problem() + "\n", false};
+        }
+        if (execution_.state() == ReExecution::State::fails) {
+            return {execution_.reason() + "\n", false};
+        }
+        if (execution_.state() == ReExecution::State::ends) {
+            const std::string text = "the journal ends: " + execution_.reason();
+            const bool good = !file_.complete() && !has_gap();
+            if (change.done()) return {text + "\n", good};
+            return {text + "; " + verdict("no difference before") + "\n", good};
+        }
+        if (change.done()) return {};
+        return {verdict(stopped ? "stopped; no difference so far" : "no difference") + "\n"};
+    }
+
+    std::string text_of_the_cut() const {
+        return fmt::format(
+            "the journal ends: it was cut off, and an edit or a value that cycle {} of thread '{}' "
+            "depends on may be missing; no difference before\n",
+            execution_.newest().number, execution_.newest().thread);
+    }
+
+    /// Returns false after a note when the execution ended before the change that was asked for.
+    bool note_missing_change() const {
+        if (machine_.change().empty() || machine_.change().done()) return true;
+        note(options_, fmt::format("--at {}: the execution ended before it", options_.at));
+        return false;
     }
 
     std::string newest_cycle() const {

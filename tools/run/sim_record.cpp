@@ -118,81 +118,133 @@ private:
     bool has_edited_ = false;
 };
 
-int record_advance(const SimOptions& options, HostedMachine& machine) {
-    Session& session = machine.session;
-    std::shared_ptr<LiveProbe> probe;
-    ProbeLayout layout;
-    EventLog::Position journal;
-    Step step;
-    std::string problem;
-    {
-        const auto lock = session.lock();
-        const std::vector<std::string> patterns = names_in(options.values);
-        if (const std::string unknown = unknown_value(session.model(), patterns);
-            !unknown.empty()) {
-            return fail(options, "--values: " + unknown);
+/// Simulates and writes the rows of one machine.
+class SimRecording {
+public:
+    /// Both outlive it.
+    SimRecording(const SimOptions& options, HostedMachine& machine)
+        : options_(options), machine_(machine), session_(machine.session) {}
+
+    /// Returns the exit status.
+    int run() {
+        if (!attach()) return 1;
+        open();
+        advance_all();
+        detach();
+        return finish();
+    }
+
+private:
+    /// Returns false after a message.
+    bool attach() {
+        const auto lock = session_.lock();
+        const std::vector<std::string> patterns = names_in(options_.values);
+        std::string problem = unknown_value(session_.model(), patterns);
+        if (!problem.empty()) {
+            fail(options_, "--values: " + problem);
+            return false;
         }
-        step = step_of(shortest_period_ns(session), options);
-        std::vector<std::string> names = chosen_values(session.model(), patterns);
-        if (names.empty()) return fail(options, "--record: the machine has no values to record");
-        probe = session.probes().attach(
-            {.names = std::move(names), .buffer_ns = step.buffered_ns, .advice = fewer_values},
+        std::vector<std::string> names = chosen_values(session_.model(), patterns);
+        if (names.empty()) {
+            fail(options_, "--record: the machine has no values to record");
+            return false;
+        }
+        step_ = step_of(shortest_period_ns(session_), options_);
+        probe_ = session_.probes().attach(
+            {.names = std::move(names), .buffer_ns = step_.buffered_ns, .advice = fewer_values},
             problem);
-        if (!probe) return fail(options, "--values: " + problem);
-        layout = Probes::layout(*probe);
-        journal = session.event_log().begin();
-    }
-    const auto sink = make_sink(options.record, Probes::columns(*probe),
-                                {options.name.empty() ? "sim" : options.name,
-                                 std::string(paths::version), "", "", 0, options.profile});
-    if (!sink->kept().empty()) {
-        write_all(2, kept_line(*sink, options.record));
-    }
-    bool good = sink->error() == 0 && sink->layout(layout.groups);
-    std::uint64_t rows = 0;
-    std::uint64_t lost = 0;
-    std::int64_t left_ns = options.for_ns;
-    std::uint64_t left_cycles = options.cycles;
-    DeterminismCheck check;
-    check.limit(step, options.for_ns);
-    while (good && problem.empty() && !machine.stop.requested() &&
-           (left_ns > 0 || left_cycles > 0)) {
-        if (left_cycles > 0) {
-            machine.advance(-1, std::min(step.cycles, left_cycles));
-        } else {
-            machine.advance(std::min(step.ns, left_ns), 0);
+        if (!probe_) {
+            fail(options_, "--values: " + problem);
+            return false;
         }
-        left_cycles -= std::min(step.cycles, left_cycles);
-        left_ns -= step.ns;
-        problem = check.advanced(machine);
-        const auto lock = session.lock();
-        for (const LoggedEvent& entry : session.event_log().after(journal)) {
-            good = good && sink->event({entry.time_ns, entry.kind, entry.text});
+        layout_ = Probes::layout(*probe_);
+        journal_ = session_.event_log().begin();
+        check_.limit(step_, options_.for_ns);
+        return true;
+    }
+
+    void open() {
+        sink_ = make_sink(options_.record, Probes::columns(*probe_),
+                          {options_.name.empty() ? "sim" : options_.name,
+                           std::string(paths::version), "", "", 0, options_.profile});
+        if (!sink_->kept().empty()) {
+            write_all(2, kept_line(*sink_, options_.record));
+        }
+        good_ = sink_->error() == 0 && sink_->layout(layout_.groups);
+    }
+
+    /// Ends early when the file cannot be written, the plans cannot be exchanged, or on a signal.
+    void advance_all() {
+        std::int64_t left_ns = options_.for_ns;
+        std::uint64_t left_cycles = options_.cycles;
+        while ((left_ns > 0 || left_cycles > 0) && may_go_on()) {
+            const std::uint64_t cycles = std::min(step_.cycles, left_cycles);
+            if (cycles > 0) {
+                machine_.advance(-1, cycles);
+            } else {
+                machine_.advance(std::min(step_.ns, left_ns), 0);
+            }
+            left_cycles -= cycles;
+            left_ns -= step_.ns;
+            problem_ = check_.advanced(machine_);
+            write_step();
+        }
+    }
+
+    bool may_go_on() const { return good_ && problem_.empty() && !machine_.stop.requested(); }
+
+    void write_step() {
+        const auto lock = session_.lock();
+        for (const LoggedEvent& entry : session_.event_log().after(journal_)) {
+            good_ = good_ && sink_->event({entry.time_ns, entry.kind, entry.text});
         }
         for (const ProbeRows& batch :
-             session.probes().take(*probe, max_taken, Probes::Rest::taken)) {
-            good = good && add_rows(*sink, batch, layout, rows);
-            lost += lost_rows(batch);
+             session_.probes().take(*probe_, max_taken, Probes::Rest::taken)) {
+            good_ = good_ && add_rows(*sink_, batch, layout_, rows_);
+            lost_ += lost_rows(batch);
         }
     }
-    {
-        const auto lock = session.lock();
-        session.probes().detach(probe);
-        session.event_log().end();
+
+    void detach() {
+        const auto lock = session_.lock();
+        session_.probes().detach(probe_);
+        session_.event_log().end();
     }
-    if (!problem.empty()) {
-        return fail(options, "the plans could not be exchanged: " + problem);
+
+    /// Closes the file. Returns the exit status.
+    int finish() {
+        if (!problem_.empty()) {
+            return fail(options_, "the plans could not be exchanged: " + problem_);
+        }
+        if (!sink_->close() || !good_) return fail(options_, cannot_write(*sink_, options_.record));
+        if (lost_ > 0) {
+            return fail(options_, fmt::format("'{}' is incomplete: {} did not fit the buffer",
+                                              options_.record, counted(lost_, "row")));
+        }
+        if (!options_.quiet) {
+            write_all(2, fmt::format("{}: {} of {}\n", options_.record, counted(rows_, "row"),
+                                     counted(Probes::columns(*probe_).size(), "value")));
+        }
+        return 0;
     }
-    if (!sink->close() || !good) return fail(options, cannot_write(*sink, options.record));
-    if (lost > 0) {
-        return fail(options, fmt::format("'{}' is incomplete: {} did not fit the buffer",
-                                         options.record, counted(lost, "row")));
-    }
-    if (!options.quiet) {
-        write_all(2, fmt::format("{}: {} of {}\n", options.record, counted(rows, "row"),
-                                 counted(Probes::columns(*probe).size(), "value")));
-    }
-    return 0;
+
+    const SimOptions& options_;
+    HostedMachine& machine_;
+    Session& session_;
+    Step step_;
+    std::shared_ptr<LiveProbe> probe_;
+    ProbeLayout layout_;
+    EventLog::Position journal_;
+    std::unique_ptr<Sink> sink_;
+    DeterminismCheck check_;
+    bool good_ = true;
+    std::string problem_;
+    std::uint64_t rows_ = 0;
+    std::uint64_t lost_ = 0;
+};
+
+int record_advance(const SimOptions& options, HostedMachine& machine) {
+    return SimRecording(options, machine).run();
 }
 
 }  // namespace
