@@ -930,6 +930,27 @@ start
             r"checksum\nto have the value named, write the journal with: --values '\*'",
         )
 
+    def test_the_inputs_of_a_function_that_differs_earlier_in_each_execution(self):
+        machine = self.run_journaled(
+            """loadrt threads name1=servo period1=1000000
+loadrt earlier
+addf earlier.0 servo
+setp earlier.0.in 3
+net value earlier.0.out
+""",
+            "--values",
+            "*",
+        )
+        self.wait_for_cycles(100)
+        self.finish(machine)
+        self.environment["EARLIER"] = "60"
+        self.assertRegex(
+            self.replay(status=1),
+            r"first difference: '\S+' \('earlier\.0' of earlier, function 'earlier\.0'\) in cycle \d+ "
+            r"of thread 'servo': (TRUE|1) instead of (FALSE|0).*\n"
+            r"inputs of 'earlier\.0' in this cycle:\n  earlier\.0\.in 3\n",
+        )
+
     def test_faults_that_another_thread_raises_while_they_are_read(self):
         machine = self.run_journaled(
             """loadrt threads name1=fast period1=200000 supervise1=60s name2=servo period2=1000000 supervise2=60s

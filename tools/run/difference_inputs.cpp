@@ -69,6 +69,21 @@ std::string text_of(const LoadedFunction& function, const std::vector<const Pin*
     return lines == 0 ? "" : text;
 }
 
+/// Executes one cycle. Returns false when the journal has no further one. What no journal reproduces
+/// may differ in another cycle than before: that does not end the execution.
+bool execute_cycle(ReplayedMachine& machine) {
+    const std::uint64_t executed = machine.execution().cycles();
+    const bool goes_on = machine.advance();
+    if (!goes_on && machine.execution().state() == ReExecution::State::differs) {
+        machine.execution().pass_difference();
+    }
+    return machine.execution().cycles() != executed;
+}
+
+bool is_behind(const JournaledCycle& newest, const ValueDifference& difference) {
+    return newest.thread == difference.thread && newest.number > difference.cycle;
+}
+
 }  // namespace
 
 std::string inputs_of(const ReplayOptions& options, const ValueDifference& difference) {
@@ -80,15 +95,9 @@ std::string inputs_of(const ReplayOptions& options, const ValueDifference& diffe
     constexpr std::uint64_t near = 1000;  // cycles: the one before, whatever was missed
     PinWords before;
     std::string text;
-    for (bool goes_on = true; goes_on && text.empty();) {
-        const std::uint64_t executed = machine.execution().cycles();
-        goes_on = machine.advance();
-        if (machine.execution().cycles() == executed || newest.thread != difference.thread ||
-            newest.number + near < difference.cycle) {
-            continue;
-        }
+    while (text.empty() && execute_cycle(machine) && !is_behind(newest, difference)) {
+        if (newest.thread != difference.thread || newest.number + near < difference.cycle) continue;
         const LoadedFunction* const function = machine.function_of(difference.name);
-        if (newest.number > difference.cycle) break;
         if (!function) continue;
         const std::vector<const Pin*> pins =
             inputs_of(*function, *machine.writer(difference.name)->instance);
