@@ -22,6 +22,7 @@ struct Component : testing::TestWithParam<std::string> {
     // One instance, all functions in one thread; `linked`: every pin on a signal of its own.
     void run(bool linked) {
         Machine machine;
+        const auto lock = machine.session.lock();
         machine.must("newthread t 1000000\n" + load(GetParam()));
         std::string text;
         for (const LoadedFunction* function : machine.session.model().sorted_functions()) {
@@ -73,6 +74,7 @@ TEST(All_components, are_found) { EXPECT_GT(all_components().size(), 30u); }
 // real time, too.
 TEST(All_components, run_together_on_a_real_thread_while_it_is_edited) {
     Machine machine(Clock::real);
+    const auto lock = machine.session.lock();
     std::string text = "newthread t 2000000\nnewthread u 4000000\n";
     for (const std::string& name : all_components()) {
         if (name == "hm2_eth") continue;  // mesa under another name, with the same instances

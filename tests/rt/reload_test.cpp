@@ -87,6 +87,7 @@ struct Reload : testing::TestWithParam<std::string> {
     Values run(std::uint32_t seed, bool spread, bool reload, std::vector<std::string>& names) {
         Values all;
         Machine machine;
+        const auto lock = machine.session.lock();
         machine.must("newthread fast 1000000\nnewthread slow 3000000\n" + load(GetParam()));
         if (!machine.edit(functions(machine.session.model(), spread))) return all;
         RandomInputs inputs(machine.session.model(), seed);

@@ -43,6 +43,7 @@ struct SafeOutputs : testing::TestWithParam<std::string> {};
 
 TEST_P(SafeOutputs, include_all_commands_of_motion) {
     Machine machine;
+    const auto lock = machine.session.lock();
     machine.must(load(GetParam()));
     for (const Pin* const pin : machine.session.model().sorted_pins()) {
         if (!pin->instance || pin->dir != HAL_DIR_OUT || pin->safe_output()) continue;

@@ -236,5 +236,21 @@ TEST_F(Live, Random_edits_keep_a_running_machine_consistent) {
     EXPECT_EQ(machine.session.reports().fault_count(), 0u);
 }
 
+TEST(Session, Components_read_the_status_until_their_machine_is_gone) {
+    for (int machines = 0; machines < 20; ++machines) {
+        Machine machine;
+        {
+            const auto lock = machine.session.lock();
+            machine.must("newthread t 1000000\nloadrt test-status names=s\naddf s t");
+            machine.start();
+        }
+        while (true) {
+            const auto lock = machine.session.lock();
+            machine.cycles(1);
+            if (machine.number("s.texts") > 0) break;
+        }
+    }
+}
+
 }  // namespace
 }  // namespace hal::test

@@ -120,7 +120,10 @@ RunningModel::RunningModel(SessionOptions options)
 }
 
 RunningModel::~RunningModel() {
-    shut_down();
+    {
+        const SessionLock held = lock();  // a thread of a component may read the status
+        shut_down();
+    }
     end_watch_for_crashes(state_->view);
     if (state_->life == SessionState::Life::abandoned) {
         keep_for_good(std::move(state_));

@@ -130,7 +130,7 @@ public:
 protected:
     /// Prepares the process for real time unless the clock is virtual or nothing is to run.
     explicit RunningModel(SessionOptions options);
-    /// Calls shut_down().
+    /// Takes the lock and calls shut_down().
     ~RunningModel();
     SessionState& state() { return *state_; }
 
