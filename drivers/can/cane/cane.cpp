@@ -2,6 +2,7 @@
 #include "cane.hpp"
 
 #include <algorithm>
+#include <array>
 #include <ctime>
 #include <memory>
 #include <vector>
@@ -271,60 +272,80 @@ private:
         }
     }
 
+    /// What one frame holds of the two queues, and where it goes.
+    struct Packing {
+        std::array<std::size_t, 2> counts{};  // process data, service data
+        std::size_t bytes = 0;
+        std::optional<ethernet::Address> to;  // nothing: to all
+
+        std::size_t messages() const { return counts[0] + counts[1]; }
+        bool is_service() const { return counts[0] == 0; }
+    };
+
+    std::size_t packed_header_bytes() const noexcept {
+        return packed_header + (settings_.key ? counter_bytes : 0);
+    }
+    std::size_t packed_tail_bytes() const noexcept { return settings_.key ? tag_bytes : 0; }
+
+    /// The part of the frame that messages are packed into; empty when there is no room for any.
+    std::span<std::uint8_t> packed_space() noexcept {
+        const std::size_t header = packed_header_bytes();
+        const std::size_t tail = packed_tail_bytes();
+        const std::size_t payload = capacity();
+        if (payload < header + tail) return {};
+        return std::span(frame_).subspan(ethernet::header_bytes + header, payload - header - tail);
+    }
+
+    std::optional<ethernet::Address> destination_of(const Frame& f) noexcept {
+        if (f.extended) return std::nullopt;
+        return nodes_.where(f.id, settings_.produced_to_master);
+    }
+
     /// Packs as many messages as fit, process data first. The frame goes to one station if all of
     /// them do.
+    Packing pack() noexcept {
+        const auto space = packed_space();
+        Packing packing;
+        const std::array queues{&process_data_, &service_data_};
+        for (std::size_t q = 0; q < queues.size(); ++q) {
+            while (const Frame* f = queues[q]->at(packing.counts[q])) {
+                if (packing.messages() == max_messages) return packing;
+                const std::size_t bytes = put_packed(*f, space.subspan(packing.bytes));
+                if (bytes == 0) return packing;
+                const auto to = destination_of(*f);
+                const bool is_first = packing.messages() == 0;
+                packing.to = is_first || packing.to == to ? to : std::nullopt;
+                packing.bytes += bytes;
+                ++packing.counts[q];
+            }
+        }
+        return packing;
+    }
+
+    ethernet::Sent launch_packed(const Packing& packing, std::int64_t now_ns) noexcept {
+        address_to(packing.to.value_or(ethernet::broadcast));
+        const std::size_t length =
+            ethernet::header_bytes + packed_header_bytes() + packing.bytes + packed_tail_bytes();
+        const bool service = packing.is_service();
+        begin_packed(std::span(frame_.data(), length),
+                     static_cast<std::uint8_t>(packing.messages()),
+                     service ? session_ | services_alone : session_, settings_.key.has_value());
+        return launch(length, service, now_ns);
+    }
+
     void flush_packed(std::int64_t now_ns) noexcept {
         while (process_data_.front() != nullptr || service_data_.front() != nullptr) {
-            const auto payload = capacity();
-            const std::size_t header = packed_header + (settings_.key ? counter_bytes : 0);
-
-            const std::size_t tail = settings_.key ? tag_bytes : 0;
-            const auto space = payload < header + tail
-                                   ? std::span<std::uint8_t>{}
-                                   : std::span(frame_).subspan(ethernet::header_bytes + header,
-                                                               payload - header - tail);
-            std::size_t bytes = 0, counts[2] = {0, 0};
-            std::optional<ethernet::Address> to;
-            bool to_all = false;
-            bool first = true;
-            bool is_full = false;
-            for (std::size_t q = 0; q < 2 && !is_full; ++q) {
-                while (const Frame* f = (q == 0 ? process_data_ : service_data_).at(counts[q])) {
-                    const auto more = counts[0] + counts[1] < max_messages
-                                          ? put_packed(*f, space.subspan(bytes))
-                                          : 0;
-                    if (more == 0) {
-                        is_full = true;
-                        break;
-                    }
-                    const auto wants = f->extended
-                                           ? std::nullopt
-                                           : nodes_.where(f->id, settings_.produced_to_master);
-                    to_all = to_all || !wants || (!first && wants != to);
-                    to = wants;
-                    first = false;
-                    bytes += more;
-                    ++counts[q];
-                }
-            }
-            auto sent = ethernet::Sent::rejected;  // not even one fits
-            if (first) {
+            Packing packing = pack();
+            auto sent = ethernet::Sent::rejected;
+            if (packing.messages() == 0) {  // not even one fits
                 count_dropped(sent);
-                counts[process_data_.front() != nullptr ? 0 : 1] = 1;
+                packing.counts[process_data_.front() != nullptr ? 0 : 1] = 1;
             } else {
-                const auto& destination = to_all ? ethernet::broadcast : *to;
-                address_to(destination);
-                const auto length = ethernet::header_bytes + header + bytes + tail;
-                const bool service = counts[0] == 0;
-                begin_packed(std::span(frame_.data(), length),
-                             static_cast<std::uint8_t>(counts[0] + counts[1]),
-                             service ? session_ | services_alone : session_,
-                             settings_.key.has_value());
-                sent = launch(length, service, now_ns);
+                sent = launch_packed(packing, now_ns);
                 if (sent == ethernet::Sent::full) return;
             }
-            done(process_data_, counts[0], sent);
-            done(service_data_, counts[1], sent);
+            done(process_data_, packing.counts[0], sent);
+            done(service_data_, packing.counts[1], sent);
         }
     }
 
