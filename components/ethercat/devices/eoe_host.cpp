@@ -4,6 +4,7 @@
 #include "ethercat/devices/eoe_host.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 
 namespace hal::ethercat::devices {
@@ -50,59 +51,77 @@ std::uint16_t checksum(const std::uint8_t* from, std::size_t bytes) noexcept {
     return static_cast<std::uint16_t>(~sum);
 }
 
+/// Turns an ARP request for `address` into its reply, RFC 826. Returns the bytes of the Ethernet
+/// frame; 0: no such request.
+std::size_t answer_arp(std::uint8_t* packet, std::size_t length, std::uint32_t address,
+                       const std::array<std::uint8_t, 6>& mac) noexcept {
+    // Ethernet, IPv4, lengths of addresses, request
+    constexpr std::uint8_t request[8] = {0, 1, 8, 0, 6, 4, 0, 1};
+    if (length < ethernet_bytes + arp_bytes) return 0;
+    if (std::memcmp(packet, request, sizeof request) != 0) return 0;
+    if (big32(packet + 24) != address) return 0;
+    packet[7] = 2;                             // reply
+    std::memcpy(packet + 18, packet + 8, 10);  // to the sender of the request
+    std::memcpy(packet + 8, mac.data(), 6);
+    put_big32(packet + 14, address);
+    return ethernet_bytes + arp_bytes;
+}
+
+/// Returns the length of an IPv4 packet without options or fragments that has an ICMP echo request
+/// to `address`, with correct checksums; 0: it is something else.
+std::size_t echo_request_bytes(const std::uint8_t* packet, std::size_t length,
+                               std::uint32_t address) noexcept {
+    constexpr std::uint16_t fragment = 0x3fff;  // more of them, or an offset
+    if (length < ethernet_bytes + ip_bytes + echo_bytes) return 0;
+    const std::size_t total = big16(packet + 2);
+    if (total < ip_bytes + echo_bytes || ethernet_bytes + total > length) return 0;
+    const bool is_plain_icmp =
+        packet[0] == 0x45 && (big16(packet + 6) & fragment) == 0 && packet[9] == protocol_icmp;
+    if (!is_plain_icmp || big32(packet + 16) != address) return 0;
+    const std::uint8_t* const echo = packet + ip_bytes;
+    const bool is_whole = checksum(packet, ip_bytes) == 0 && checksum(echo, total - ip_bytes) == 0;
+    return is_whole && echo[0] == echo_request ? total : 0;
+}
+
+/// Turns an ICMP echo request to `address` into its reply, RFC 792. Returns the bytes of the
+/// Ethernet frame; 0: no such request.
+std::size_t answer_echo(std::uint8_t* packet, std::size_t length, std::uint32_t address) noexcept {
+    const std::size_t total = echo_request_bytes(packet, length, address);
+    if (total == 0) return 0;
+    std::memcpy(packet + 16, packet + 12, 4);
+    put_big32(packet + 12, address);
+    packet[8] = 64;  // time to live
+    put_big16(packet + 10, 0);
+    put_big16(packet + 10, checksum(packet, ip_bytes));
+    std::uint8_t* const echo = packet + ip_bytes;
+    echo[0] = echo_reply;
+    put_big16(echo + 2, 0);
+    put_big16(echo + 2, checksum(echo, total - ip_bytes));
+    return ethernet_bytes + total;
+}
+
 }  // namespace
 
 std::size_t EoeHost::answer(std::size_t length) noexcept {
+    constexpr std::size_t min_frame = 60;
     std::uint8_t* const frame = frame_.data();
     std::uint8_t* const packet = frame + ethernet_bytes;
-    const bool group = (frame[0] & 1) != 0;
-    const bool own = std::memcmp(frame, ip_.mac.data(), 6) == 0;
-    if (length < ethernet_bytes || ip_.address == 0 || (!group && !own)) return 0;
+    if (length < ethernet_bytes || ip_.address == 0) return 0;
+    const bool is_group = (frame[0] & 1) != 0;
+    if (!is_group && std::memcmp(frame, ip_.mac.data(), 6) != 0) return 0;
     std::size_t bytes = 0;
-    if (big16(frame + 12) == type_arp && length >= ethernet_bytes + arp_bytes) {
-        // Ethernet, IPv4, lengths of addresses, request
-        constexpr std::uint8_t request[8] = {0, 1, 8, 0, 6, 4, 0, 1};
-        if (std::memcmp(packet, request, sizeof request) != 0 ||
-            big32(packet + 24) != ip_.address) {
-            return 0;
-        }
-        packet[7] = 2;
-        std::memcpy(packet + 18, packet + 8, 10);  // the asker's addresses
-        std::memcpy(packet + 8, ip_.mac.data(), 6);
-        put_big32(packet + 14, ip_.address);
-        bytes = ethernet_bytes + arp_bytes;
-    } else if (big16(frame + 12) == type_ip && length >= ethernet_bytes + ip_bytes + echo_bytes) {
-        const std::size_t total = big16(packet + 2);
-        std::uint8_t* const echo = packet + ip_bytes;
-        const bool fits =
-            packet[0] == 0x45 && total >= ip_bytes + echo_bytes && ethernet_bytes + total <= length;
-        if (!fits || (big16(packet + 6) & 0x3fff) != 0 || packet[9] != protocol_icmp ||
-            big32(packet + 16) != ip_.address) {
-            return 0;
-        }
-        if (checksum(packet, ip_bytes) != 0 || checksum(echo, total - ip_bytes) != 0 ||
-            echo[0] != echo_request) {
-            return 0;
-        }
-        std::memcpy(packet + 16, packet + 12, 4);
-        put_big32(packet + 12, ip_.address);
-        packet[8] = 64;  // time to live
-        put_big16(packet + 10, 0);
-        put_big16(packet + 10, checksum(packet, ip_bytes));
-        echo[0] = echo_reply;
-        put_big16(echo + 2, 0);
-        put_big16(echo + 2, checksum(echo, total - ip_bytes));
-        bytes = ethernet_bytes + total;
-    } else {
-        return 0;
+    switch (big16(frame + 12)) {
+    case type_arp: bytes = answer_arp(packet, length, ip_.address, ip_.mac); break;
+    case type_ip: bytes = answer_echo(packet, length, ip_.address); break;
+    default: return 0;
     }
+    if (bytes == 0) return 0;
     std::memcpy(frame, frame + 6, 6);
     std::memcpy(frame + 6, ip_.mac.data(), 6);
-    constexpr std::size_t smallest = 60;
-    if (bytes < smallest) {
-        std::memset(frame + bytes, 0, smallest - bytes);
+    if (bytes < min_frame) {
+        std::memset(frame + bytes, 0, min_frame - bytes);
     }
-    return std::max(bytes, smallest);
+    return std::max(bytes, min_frame);
 }
 
 void EoeHost::take(const MailboxMessage& message, State, Outbox& out) noexcept {

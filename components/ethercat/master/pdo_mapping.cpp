@@ -133,8 +133,11 @@ Task<bool> write_list(Channel& c, Bus& bus, Device& d, std::uint16_t index, std:
     co_return static_cast<bool>(r);
 }
 
+/// A bit for each of the first 64 PDOs of a sync manager.
+using PdoSet = std::uint64_t;
+
 Task<bool> write_mappings(Channel& c, Bus& bus, Device& d, const SyncManager& sm,
-                          std::uint64_t which) noexcept {
+                          PdoSet which) noexcept {
     for (std::size_t n = 0; n < sm.pdos.size(); ++n) {
         if ((which >> n & 1) == 0) continue;
         const Pdo& pdo = sm.pdos[n];
@@ -148,16 +151,16 @@ Task<bool> write_mappings(Channel& c, Bus& bus, Device& d, const SyncManager& sm
     co_return true;
 }
 
-/// Writes the PDO mapping and the assignment of a sync manager where they differ from the setup.
-/// Returns false when that failed; it is reported. `limit`: entries that a PDO of the slave can
-/// have, 0: unknown.
-Task<bool> map_manager(Channel& c, Bus& bus, Device& d, const SyncManager& sm,
-                       unsigned limit) noexcept {
-    std::uint64_t differing = 0;  // PDOs whose mapping differs
-    for (std::size_t n = 0; n < sm.pdos.size() && n < 64; ++n) {
+/// Finds the PDOs whose mapping has to be written. `limit`: entries that a PDO of the slave can
+/// have, 0: unknown. Returns false when that failed; it is reported.
+Task<bool> find_differing(Channel& c, Bus& bus, Device& d, const SyncManager& sm, unsigned limit,
+                          PdoSet& differing) noexcept {
+    constexpr std::size_t max_pdos = 64;
+    constexpr std::size_t max_entries = 254;
+    for (std::size_t n = 0; n < sm.pdos.size() && n < max_pdos; ++n) {
         const Pdo& pdo = sm.pdos[n];
         if (!pdo.write_mapping) continue;
-        if (pdo.mapped() > 254 || (limit != 0 && pdo.mapped() > limit)) {
+        if (pdo.mapped() > max_entries || (limit != 0 && pdo.mapped() > limit)) {
             bus.report(Event::too_many_entries, d, pdo.index,
                        static_cast<std::int64_t>(pdo.mapped()));
             co_return false;
@@ -165,9 +168,30 @@ Task<bool> map_manager(Channel& c, Bus& bus, Device& d, const SyncManager& sm,
         const Compared now = co_await compare_mapping(c, bus, d, pdo, false);
         if (now == Compared::failed) co_return false;
         if (now == Compared::differs) {
-            differing |= std::uint64_t{1} << n;
+            differing |= PdoSet{1} << n;
         }
     }
+    co_return true;
+}
+
+/// A mapping changes only while its PDO is not assigned: slaves that check this have their
+/// assignment cleared first, and written after any change.
+Task<bool> write_assignment(Channel& c, Bus& bus, Device& d, const SyncManager& sm) noexcept {
+    const auto want = [&sm](std::size_t n) { return sm.pdos[n].index; };
+    const bool ok = co_await write_list<std::uint16_t>(c, bus, d, assignment_of(sm.number),
+                                                       sm.pdos.size(), want, sm.assignment_first);
+    if (!ok) co_return false;
+    const Compared now = co_await compare_assignment(c, bus, d, sm, true);
+    co_return now == Compared::same;
+}
+
+/// Writes the PDO mapping and the assignment of a sync manager where they differ from the setup.
+/// Returns false when that failed; it is reported. `limit`: see find_differing().
+Task<bool> map_manager(Channel& c, Bus& bus, Device& d, const SyncManager& sm,
+                       unsigned limit) noexcept {
+    PdoSet differing = 0;
+    const bool found = co_await find_differing(c, bus, d, sm, limit, differing);
+    if (!found) co_return false;
     // the assignment is written in any case when it is cleared before a mapping
     bool assign = differing != 0 && sm.assignment_first;
     if (sm.write_assignment && !assign) {
@@ -177,23 +201,16 @@ Task<bool> map_manager(Channel& c, Bus& bus, Device& d, const SyncManager& sm,
     }
     if (differing == 0 && !assign) co_return true;
 
-    // A mapping changes only while its PDO is not assigned, so the assignment is written again
-    // after any change.
-    const std::uint16_t object = assignment_of(sm.number);
-    bool ok = true;
     if (sm.assignment_first) {
-        const SdoResult r = co_await write_value<std::uint8_t>(c, bus, d, object, 0, 0);
-        if (!r) co_return false;
+        const SdoResult cleared =
+            co_await write_value<std::uint8_t>(c, bus, d, assignment_of(sm.number), 0, 0);
+        if (!cleared) co_return false;
     }
-    ok = co_await write_mappings(c, bus, d, sm, differing);
-    if (!ok) co_return false;
-    if (!assign && !sm.assignment_first) co_return true;
-    const auto want = [&sm](std::size_t n) { return sm.pdos[n].index; };
-    ok = co_await write_list<std::uint16_t>(c, bus, d, object, sm.pdos.size(), want,
-                                            sm.assignment_first);
-    if (!ok) co_return false;
-    const Compared now = co_await compare_assignment(c, bus, d, sm, true);
-    co_return now == Compared::same;
+    const bool mapped = co_await write_mappings(c, bus, d, sm, differing);
+    if (!mapped) co_return false;
+    if (!assign) co_return true;
+    const bool assigned = co_await write_assignment(c, bus, d, sm);
+    co_return assigned;
 }
 
 /// Compares the process data of a slave that cannot change it with what its SII states; 0 bytes
