@@ -2,6 +2,7 @@
 #include "concise_dcf.hpp"
 
 #include <algorithm>
+#include <iterator>
 
 #include "cia301/values.hpp"
 #include "eds_reader.hpp"
@@ -115,56 +116,61 @@ private:
     /// the COB-ID that switches it on. A PDO that cannot be switched off gets its values as they
     /// are.
     void pdo(const Object& communication) {
-        const Object* mapping = d_.find(static_cast<std::uint16_t>(communication.index + 0x200));
-        const auto changes = [&](const Object& object) {
-            std::vector<Write> writes;
-            for (const Entry& entry : object.entries) {
-                if (auto data = wanted(object.index, entry)) {
-                    writes.push_back({object.index, entry.sub, std::move(*data)});
-                }
-            }
-            return writes;
-        };
-        std::vector<Write> settings = changes(communication), mapped;
-        if (mapping != nullptr) {
-            mapped = changes(*mapping);
-        }
+        const Object* const mapping =
+            d_.find(static_cast<std::uint16_t>(communication.index + 0x200));
+        const std::vector<Write> settings = changes(communication);
+        const std::vector<Write> mapped =
+            mapping != nullptr ? changes(*mapping) : std::vector<Write>();
         if (settings.empty() && mapped.empty()) return;
-        const Entry* cob = communication.find(1);
+        const Entry* const cob = communication.find(1);
         if (cob == nullptr || !cob->writable()) {  // cannot be switched off
-            out_.writes.insert(out_.writes.end(), settings.begin(), settings.end());
-            out_.writes.insert(out_.writes.end(), mapped.begin(), mapped.end());
+            add_from(settings, 0);
+            add_from(mapped, 0);
             return;
         }
         const std::vector<std::uint8_t> final_cob = value_of(*cob, node_);
-        if (final_cob.size() == 4) {
+        const bool is_known = final_cob.size() == 4;
+        if (is_known) {
             add(communication.index, 1, cia301::natural_of(final_cob) | pdo_off, 4);
         }
         if (!mapped.empty()) {
-            const Entry* count = mapping->find(0);
-            const bool counts = count != nullptr && count->writable();
-            if (counts) {
-                add(mapping->index, 0, 0, 1);
-            }
-            for (Write& write : mapped) {
-                if (write.sub != 0) {
-                    out_.writes.push_back(std::move(write));
-                }
-            }
-            const std::vector<std::uint8_t> number =
-                count != nullptr ? value_of(*count, node_) : std::vector<std::uint8_t>();
-            if (counts && !number.empty()) {
-                out_.writes.push_back({mapping->index, 0, number});
-            }
+            add_mapping(*mapping, mapped);
         }
-        for (Write& write : settings) {
-            if (write.sub > 1) {
-                out_.writes.push_back(std::move(write));
-            }
-        }
-        if (final_cob.size() == 4 && (cia301::natural_of(final_cob) & pdo_off) == 0) {
+        add_from(settings, 2);
+        if (is_known && (cia301::natural_of(final_cob) & pdo_off) == 0) {
             out_.writes.push_back({communication.index, 1, final_cob});
         }
+    }
+
+    std::vector<Write> changes(const Object& object) {
+        std::vector<Write> writes;
+        for (const Entry& entry : object.entries) {
+            if (auto data = wanted(object.index, entry)) {
+                writes.push_back({object.index, entry.sub, std::move(*data)});
+            }
+        }
+        return writes;
+    }
+
+    /// The number of mapped objects is 0 while the mapping is written.
+    void add_mapping(const Object& mapping, const std::vector<Write>& mapped) {
+        const Entry* const count = mapping.find(0);
+        const bool is_counted = count != nullptr && count->writable();
+        if (is_counted) {
+            add(mapping.index, 0, 0, 1);
+        }
+        add_from(mapped, 1);
+        if (!is_counted) return;
+        const std::vector<std::uint8_t> number = value_of(*count, node_);
+        if (!number.empty()) {
+            out_.writes.push_back({mapping.index, 0, number});
+        }
+    }
+
+    /// Adds those of the sub-indices from `first` on.
+    void add_from(const std::vector<Write>& writes, unsigned first) {
+        std::ranges::copy_if(writes, std::back_inserter(out_.writes),
+                             [first](const Write& write) { return write.sub >= first; });
     }
 
     void add(std::uint16_t index, std::uint8_t sub, std::uint64_t value, unsigned bytes) {

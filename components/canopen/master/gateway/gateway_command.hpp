@@ -114,6 +114,7 @@ std::string_view help_text();
 
 /// Transmission types of PDO commands that are written as a word: `event`, `rtr`, `sync0` …
 /// `sync240`.
+inline constexpr std::uint32_t max_synchronous = 240;
 inline constexpr std::uint32_t on_event = 255;
 inline constexpr std::uint32_t on_request = 253;
 

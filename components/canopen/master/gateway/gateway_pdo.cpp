@@ -130,40 +130,55 @@ Error Pdos::write(const Command& c, std::string& why) {
     return Error::none;
 }
 
-void Pdos::handle(const Frame& f, const std::function<void(const std::string&)>& on_pdo) {
-    if (f.id == 0x80 && !f.extended && !f.remote) {
-        for (auto& [number, p] : received_) {
-            if (p.held) {
-                p.held = false;
-                p.fresh = true;
-                p.data = p.waiting;
-                on_pdo(text(number, p));
-            }
-        }
-        for (auto& [number, p] : sent_) {
-            if (!p.fresh || p.transmission > 240) continue;
-            if (p.transmission == 0) {
-                send(p);
-                p.fresh = false;
-            } else if (++p.syncs >= p.transmission) {
-                send(p);
-                p.syncs = 0;
-            }
-        }
-        return;
+void Pdos::handle(const Frame& f, const Report& on_pdo) {
+    const bool is_sync = f.id == 0x80 && !f.extended && !f.remote;
+    if (is_sync) {
+        pass_synchronous(on_pdo);
+        send_synchronous();
+    } else if (f.remote) {
+        send_requested(f);
+    } else {
+        accept(f, on_pdo);
     }
-    if (f.remote) {
-        for (const auto& [number, p] : sent_) {
-            if (is(f, p.cob) && p.transmission == on_request && p.fresh) {
-                send(p);
-            }
-        }
-        return;
+}
+
+/// Synchronous PDOs that have arrived are valid from the SYNC on.
+void Pdos::pass_synchronous(const Report& on_pdo) {
+    for (auto& [number, p] : received_) {
+        if (!p.held) continue;
+        p.held = false;
+        p.fresh = true;
+        p.data = p.waiting;
+        on_pdo(text(number, p));
     }
+}
+
+void Pdos::send_synchronous() {
+    for (auto& [number, p] : sent_) {
+        if (!p.fresh || p.transmission > max_synchronous) continue;
+        if (p.transmission == 0) {  // acyclic: once for each value
+            send(p);
+            p.fresh = false;
+        } else if (++p.syncs >= p.transmission) {
+            send(p);
+            p.syncs = 0;
+        }
+    }
+}
+
+void Pdos::send_requested(const Frame& request) {
+    for (const auto& [number, p] : sent_) {
+        if (is(request, p.cob) && p.transmission == on_request && p.fresh) {
+            send(p);
+        }
+    }
+}
+
+void Pdos::accept(const Frame& f, const Report& on_pdo) {
     for (auto& [number, p] : received_) {
         if (!is(f, p.cob) || f.length * 8U < bits(p)) continue;
         std::copy_n(f.data.begin(), 8, p.waiting.begin());
-        if (p.transmission <= 240) {
+        if (p.transmission <= max_synchronous) {
             p.held = true;
             continue;
         }

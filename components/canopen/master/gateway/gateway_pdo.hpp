@@ -27,8 +27,11 @@ public:
     bool request(unsigned number);
     bool arrived(unsigned number) const;
 
-    /// Takes PDOs and SYNC. `on_pdo` gets the text of those received.
-    void handle(const Frame&, const std::function<void(const std::string&)>& on_pdo);
+    /// Gets the text of a PDO that has been received.
+    using Report = std::function<void(const std::string&)>;
+
+    /// Passes on PDOs, remote requests and SYNC.
+    void handle(const Frame&, const Report& on_pdo);
     void clear() {
         received_.clear();
         sent_.clear();
@@ -49,6 +52,10 @@ private:
     static unsigned bits(const Pdo&);
     static std::string text(unsigned number, const Pdo&);
     bool send(const Pdo&);
+    void pass_synchronous(const Report&);
+    void send_synchronous();
+    void send_requested(const Frame&);
+    void accept(const Frame&, const Report&);
 
     FrameQueue& out_;
     std::map<unsigned, Pdo> received_, sent_;
