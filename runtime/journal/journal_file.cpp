@@ -180,6 +180,52 @@ void JournalFile::add_entry(std::uint32_t sequence, std::string_view payload) {
     }
 }
 
+JournalFile::Channels JournalFile::add_channels(const mcap::Reader& reader) {
+    Channels found;
+    for (const auto& [id, channel] : reader.channels()) {
+        if (channel.topic == journal_format::entries_topic) {
+            found.entries = id;
+        } else if (channel.topic == journal_format::setup_topic) {
+            found.setup = id;
+        } else if (channel.topic == journal_format::state_topic) {
+            found.state = id;
+        } else if (channel.topic.starts_with(journal_format::cycles_topic)) {
+            const auto number = number_in<std::uint32_t>(channel.metadata, "number");
+            found.threads[id] = number;
+            JournaledThread& thread = threads_[number];
+            thread.number = number;
+            thread.name = text_in(channel.metadata, "journaled_thread");
+            thread.period_ns = number_in<std::int64_t>(channel.metadata, "journaled_period_ns");
+        }
+    }
+    return found;
+}
+
+/// A file that has the state needs none before it.
+void JournalFile::forget_earlier() {
+    entries_.clear();
+    entries_end_ = false;
+    setup_ = {};
+    for (auto& [number, thread] : threads_) {
+        thread.forget();
+    }
+}
+
+void JournalFile::add_message(const Channels& channels, const mcap::Message& message) {
+    if (channels.entries == message.channel) {
+        add_entry(message.sequence, message.payload);
+    } else if (channels.setup == message.channel) {
+        if (auto record = setup_record(message.payload)) {
+            setup_.add(std::move(*record));
+        }
+    } else if (channels.state == message.channel) {
+        begin_ = journal_begin(message.payload);
+    } else if (const auto thread = channels.threads.find(message.channel);
+               thread != channels.threads.end()) {
+        threads_[thread->second].add(batch_of(message));
+    }
+}
+
 bool JournalFile::add(const std::string& path) {
     auto source = mcap::open_file(path, problem_);
     if (!source) return false;
@@ -189,49 +235,15 @@ bool JournalFile::add(const std::string& path) {
         return false;
     }
     if (!add_head(reader)) return false;
-    std::map<std::uint16_t, std::uint32_t> thread_of;
-    std::optional<std::uint16_t> entries;
-    std::optional<std::uint16_t> setup;
-    std::optional<std::uint16_t> state;
-    for (const auto& [id, channel] : reader.channels()) {
-        if (channel.topic == journal_format::entries_topic) {
-            entries = id;
-        } else if (channel.topic == journal_format::setup_topic) {
-            setup = id;
-        } else if (channel.topic == journal_format::state_topic) {
-            state = id;
-        } else if (channel.topic.starts_with(journal_format::cycles_topic)) {
-            const auto number = number_in<std::uint32_t>(channel.metadata, "number");
-            thread_of[id] = number;
-            JournaledThread& thread = threads_[number];
-            thread.number = number;
-            thread.name = text_in(channel.metadata, "journaled_thread");
-            thread.period_ns = number_in<std::int64_t>(channel.metadata, "journaled_period_ns");
-        }
-    }
-    if (state) {  // the files before it are not needed
-        entries_.clear();
-        entries_end_ = false;
-        setup_ = {};
-        for (auto& [number, thread] : threads_) {
-            thread.forget();
-        }
+    const Channels channels = add_channels(reader);
+    if (channels.state) {
+        forget_earlier();
     }
     const bool all = reader.each([&](const mcap::Message& message) {
-        if (entries == message.channel) {
-            add_entry(message.sequence, message.payload);
-        } else if (setup == message.channel) {
-            if (auto record = setup_record(message.payload)) {
-                setup_.add(std::move(*record));
-            }
-        } else if (state == message.channel) {
-            begin_ = journal_begin(message.payload);
-        } else if (const auto thread = thread_of.find(message.channel); thread != thread_of.end()) {
-            threads_[thread->second].add(batch_of(message));
-        }
+        add_message(channels, message);
         return true;
     });
-    if (state && !begin_) {
+    if (channels.state && !begin_) {
         problem_ = "the state that it begins with is missing or damaged";
         return false;
     }

@@ -18,6 +18,7 @@
 
 namespace hal::mcap {
 class Reader;
+struct Message;
 }
 
 namespace hal {
@@ -117,8 +118,19 @@ public:
     std::int64_t unix_offset_ns() const { return unix_offset_ns_; }
 
 private:
+    /// The channels of one file.
+    struct Channels {
+        std::optional<std::uint16_t> entries;
+        std::optional<std::uint16_t> setup;
+        std::optional<std::uint16_t> state;
+        std::map<std::uint16_t, std::uint32_t> threads;  // the number of the thread
+    };
+
     bool add(const std::string& path);
     bool add_head(mcap::Reader& reader);
+    Channels add_channels(const mcap::Reader& reader);
+    void forget_earlier();
+    void add_message(const Channels& channels, const mcap::Message& message);
     void add_entry(std::uint32_t sequence, std::string_view payload);
 
     std::string problem_;

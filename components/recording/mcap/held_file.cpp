@@ -2,6 +2,7 @@
 #include "recording/mcap/held_file.hpp"
 
 #include <cerrno>
+#include <cstdint>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
@@ -58,53 +59,80 @@ std::string set_aside(const std::string& part, const std::string& target) {
 }
 
 /// Opens a file for one recorder, and empties it. Another recorder that has it fails with EBUSY. A
-/// part that a killed recorder left behind is kept under another name, in HeldFile::kept. The file
-/// is opened again when it was replaced between opening and locking it.
-HeldFile hold(const std::string& path, bool part) {
-    HeldFile held;
-    held.target = followed(path);
-    held.path = part ? held.target + ".part" : held.target;
-    const auto failed = [&](int error, std::string sentence) {
-        if (held.file >= 0) {
-            ::close(held.file);
-        }
-        held.file = -1;
-        held.error = error;
-        held.problem = sentence.empty() ? std::strerror(error) : std::move(sentence);
-        return held;
-    };
-    for (const std::string& name : {held.target, held.path}) {
-        if (std::string reason = not_a_file(name); !reason.empty()) {
-            return failed(EINVAL, std::move(reason));
-        }
+/// part that a killed recorder left behind is kept under another name, in HeldFile::kept.
+class Holder {
+public:
+    Holder(const std::string& path, bool part) : part_(part) {
+        held_.target = followed(path);
+        held_.path = part ? held_.target + ".part" : held_.target;
     }
-    for (int attempt = 0; attempt < 100; ++attempt) {
-        held.file =
-            ::open(held.path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | O_NONBLOCK | O_NOCTTY,
-                   part ? 0640 : 0666);
-        if (held.file < 0) return failed(errno, "");
-        // a file system without locks: as before
-        if (::flock(held.file, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
-            return failed(EBUSY,
-                          "another recorder is writing it; end that one, or name another file");
+
+    /// Opens again when the file was replaced between opening and locking it.
+    HeldFile hold() {
+        constexpr int max_attempts = 100;
+        for (const std::string& name : {held_.target, held_.path}) {
+            std::string reason = not_a_file(name);
+            if (!reason.empty()) return failed(EINVAL, std::move(reason));
         }
+        for (int attempt = 0; attempt < max_attempts; ++attempt) {
+            if (!open()) return failed(errno);
+            if (!lock()) {
+                return failed(EBUSY,
+                              "another recorder is writing it; end that one, or name another file");
+            }
+            switch (claim()) {
+            case Claim::held: return held_;
+            case Claim::failed: return failed(errno);
+            case Claim::again: close(); break;
+            }
+        }
+        return failed(EBUSY);
+    }
+
+private:
+    enum class Claim : std::uint8_t { held, failed, again };
+
+    bool open() {
+        held_.file =
+            ::open(held_.path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | O_NONBLOCK | O_NOCTTY,
+                   part_ ? 0640 : 0666);
+        return held_.file >= 0;
+    }
+
+    /// Returns false when another recorder has it. A file system without locks has none.
+    bool lock() const {
+        return ::flock(held_.file, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK;
+    }
+
+    /// Takes the locked file, or moves what an earlier recorder left out of the way.
+    Claim claim() {
+        // another recorder has completed it between opening and locking
+        if (!same_file(held_.file, held_.path)) return Claim::again;
         struct stat about{};
-        // else the other recorder has just completed it
-        const bool current = same_file(held.file, held.path);
-        if (current && ::fstat(held.file, &about) != 0) return failed(errno, "");
-        if (current && (!part || about.st_size == 0)) {
-            if (about.st_size != 0 && ::ftruncate(held.file, 0) != 0) return failed(errno, "");
-            return held;
-        }
-        if (current) {
-            held.kept = set_aside(held.path, held.target);
-            if (held.kept.empty()) return failed(errno, "");
-        }
-        ::close(held.file);
-        held.file = -1;
+        if (::fstat(held_.file, &about) != 0) return Claim::failed;
+        if (about.st_size == 0) return Claim::held;
+        if (!part_) return ::ftruncate(held_.file, 0) == 0 ? Claim::held : Claim::failed;
+        held_.kept = set_aside(held_.path, held_.target);
+        return held_.kept.empty() ? Claim::failed : Claim::again;
     }
-    return failed(EBUSY, "");
-}
+
+    void close() {
+        if (held_.file >= 0) {
+            ::close(held_.file);
+        }
+        held_.file = -1;
+    }
+
+    HeldFile failed(int error, std::string sentence = "") {
+        close();
+        held_.error = error;
+        held_.problem = sentence.empty() ? std::strerror(error) : std::move(sentence);
+        return held_;
+    }
+
+    bool part_;
+    HeldFile held_;
+};
 
 }  // namespace
 
@@ -119,7 +147,7 @@ std::string unwritable(const std::string& path) {
     return "";
 }
 
-HeldFile hold_part(const std::string& path) { return hold(path, true); }
-HeldFile hold_file(const std::string& path) { return hold(path, false); }
+HeldFile hold_part(const std::string& path) { return Holder(path, true).hold(); }
+HeldFile hold_file(const std::string& path) { return Holder(path, false).hold(); }
 
 }  // namespace hal::mcap

@@ -166,6 +166,62 @@ bool check_options(const NewThread& thread, Diagnostics& diagnostics) {
     return fits_period(thread, diagnostics);
 }
 
+/// "period1=1000000"
+struct NumberedOption {
+    std::string_view key;
+    std::int64_t number = 0;
+    std::string_view value;
+};
+
+std::optional<NumberedOption> numbered_option(std::string_view text) {
+    const auto equals = text.find('=');
+    if (equals == std::string_view::npos) return std::nullopt;
+    const auto digits = text.substr(0, equals).find_last_not_of("0123456789") + 1;
+    NumberedOption option{text.substr(0, digits), 0, text.substr(equals + 1)};
+    if (!parse_whole(text.substr(digits, equals - digits), option.number)) return std::nullopt;
+    return option;
+}
+
+/// Sets an option of the thread with the number that the text names. Returns false after reporting.
+bool set_numbered_option(std::map<std::int64_t, NewThread>& by_number, const Token& token,
+                         Diagnostics& diagnostics) {
+    const auto option = numbered_option(token.text);
+    bool known = option.has_value();
+    bool good = true;
+    if (option) {
+        NewThread& thread = by_number[option->number];
+        if (option->key == "name") {
+            thread.name = option->value;
+            thread.at = token.span;
+        } else if (option->key == "period" && is_no_period(option->value)) {
+            thread.omitted = true;
+        } else if (option->key == "period") {
+            good = set_period(thread, option->value, token.span, diagnostics);
+        } else {
+            good = set_option(thread, option->key, option->value, token.span, diagnostics, known);
+        }
+    }
+    if (known) return good;
+    diagnostics.error("unknown-argument", token.span,
+                      "threads has no argument '" + token.text + "'", "",
+                      "arguments: name1=NAME period1=NS cpu1=N policy1=… spin1=… budget1=… "
+                      "supervise1=…, then name2= and so on");
+    return false;
+}
+
+/// `at`: of the command.
+void set_defaults(NewThread& thread, std::int64_t number, Span at) {
+    if (thread.name.empty()) {
+        thread.name = "thread" + std::to_string(number);
+    }
+    if (!thread.at.known()) {
+        thread.at = thread.period_at.known() ? thread.period_at : at;
+    }
+    if (thread.options.period_ns == 0) {
+        thread.options.period_ns = 1'000'000;
+    }
+}
+
 }  // namespace
 
 bool parse_new_thread(std::span<const Token> args, NewThread& thread, Diagnostics& diagnostics) {
@@ -196,50 +252,14 @@ bool parse_threads(std::span<const Token> args, Span at, std::vector<NewThread>&
     std::map<std::int64_t, NewThread> by_number;
     bool good = true;
     for (const Token& token : args) {
-        const std::string_view text = token.text;
-        const auto equals = text.find('=');
-        const auto digits = text.substr(0, equals).find_last_not_of("0123456789") + 1;
-        std::int64_t number = 0;
-        bool known = false;
-        if (equals != std::string_view::npos && digits < equals &&
-            parse_whole(text.substr(digits, equals - digits), number)) {
-            const std::string_view key = text.substr(0, digits);
-            const std::string_view value = text.substr(equals + 1);
-            NewThread& thread = by_number[number];
-            known = true;
-            if (key == "name") {
-                thread.name = value;
-                thread.at = token.span;
-            } else if (key == "period" && is_no_period(value)) {
-                thread.omitted = true;
-            } else if (key == "period") {
-                good = set_period(thread, value, token.span, diagnostics) && good;
-            } else {
-                good = set_option(thread, key, value, token.span, diagnostics, known) && good;
-            }
-        }
-        if (!known) {
-            diagnostics.error("unknown-argument", token.span,
-                              "threads has no argument '" + token.text + "'", "",
-                              "arguments: name1=NAME period1=NS cpu1=N policy1=… spin1=… budget1=… "
-                              "supervise1=…, then name2= and so on");
-            good = false;
-        }
+        good = set_numbered_option(by_number, token, diagnostics) && good;
     }
     if (by_number.empty()) {
         by_number[1];
     }
     for (auto& [number, thread] : by_number) {
         if (thread.omitted) continue;
-        if (thread.name.empty()) {
-            thread.name = "thread" + std::to_string(number);
-        }
-        if (!thread.at.known()) {
-            thread.at = thread.period_at.known() ? thread.period_at : at;
-        }
-        if (thread.options.period_ns == 0) {
-            thread.options.period_ns = 1'000'000;
-        }
+        set_defaults(thread, number, at);
         good = check_options(thread, diagnostics) && good;
         threads.push_back(std::move(thread));
     }

@@ -130,57 +130,72 @@ std::string id_text(std::uint32_t id) {
     return text;
 }
 
+namespace {
+
+std::string ns(Time time) { return std::to_string(time) + "ns"; }
+
+std::string line_of(const Node& n) {
+    std::string line = "node " + n.name + (n.senses ? " A" : " B");
+    if (n.role != Role::node) {
+        line += std::string(" ") + to_string(n.role);
+    }
+    if (n.role == Role::backup) {
+        line += " " + std::to_string(n.backup);
+    }
+    return line;
+}
+
+std::string line_of(const Use& u, const Table& t) {
+    std::string line = to_string(u.kind);
+    if (u.kind == Kind::priv) {
+        line += " " + t.nodes[u.node].name + (u.ids.empty() ? " any" : " ");
+    }
+    for (std::size_t i = 0; i < u.ids.size(); ++i) {
+        line += (i == 0 ? "" : ",") + id_text(u.ids[i]);
+    }
+    if (u.every > 1) {
+        line += " every " + std::to_string(u.every) + " offset " + std::to_string(u.offset);
+    }
+    return line;
+}
+
+std::string line_of(const Message& m, const Table& t) {
+    std::string line = "message " + m.name + " " + id_text(m.id) + " node " + t.nodes[m.node].name +
+                       " bytes " + std::to_string(m.bytes);
+    if (m.period > 0) {
+        line += (m.event ? " event " : " period ") + ns(m.period);
+    }
+    if (m.deadline > 0) {
+        line += " deadline " + ns(m.deadline);
+    }
+    if (m.jitter > 0) {
+        line += " jitter " + ns(m.jitter);
+    }
+    for (std::size_t i = 0; i < m.fields.size(); ++i) {
+        line += (i == 0 ? " fields " : ",") + m.fields[i].name + ":" + to_string(m.fields[i].type);
+    }
+    return line;
+}
+
+}  // namespace
+
 std::string normalised(const Table& t) {
-    const auto ns = [](Time time) { return std::to_string(time) + "ns"; };
     std::string text = "bitrate " + std::to_string(t.bit_rate) + "\ncycle " + ns(t.cycle) +
                        "\nslots " + std::to_string(t.slots) + "\nguard " + ns(t.guard) + "\nidle " +
                        ns(t.idle) + "\nlost " + std::to_string(t.lost) + "\n";
     for (const Node& n : t.nodes) {
-        text += "node " + n.name + (n.senses ? " A" : " B");
-        if (n.role != Role::node) {
-            text += std::string(" ") + to_string(n.role);
-        }
-        if (n.role == Role::backup) {
-            text += " " + std::to_string(n.backup);
-        }
-        text += "\n";
+        text += line_of(n) + "\n";
     }
     for (const Mode& m : t.modes) {
         text += "mode " + std::to_string(m.number) + " " + m.name + "\n";
         for (std::size_t slot = 0; slot < m.slots.size(); ++slot) {
             for (const Use& u : m.slots[slot]) {
-                text += std::to_string(slot) + " " + to_string(u.kind);
-                if (u.kind == Kind::priv) {
-                    text += " " + t.nodes[u.node].name + (u.ids.empty() ? " any" : " ");
-                }
-                for (std::size_t i = 0; i < u.ids.size(); ++i) {
-                    text += (i == 0 ? "" : ",") + id_text(u.ids[i]);
-                }
-                if (u.every > 1) {
-                    text +=
-                        " every " + std::to_string(u.every) + " offset " + std::to_string(u.offset);
-                }
-                text += "\n";
+                text += std::to_string(slot) + " " + line_of(u, t) + "\n";
             }
         }
     }
     for (const Message& m : t.messages) {
-        text += "message " + m.name + " " + id_text(m.id) + " node " + t.nodes[m.node].name +
-                " bytes " + std::to_string(m.bytes);
-        if (m.period > 0) {
-            text += (m.event ? " event " : " period ") + ns(m.period);
-        }
-        if (m.deadline > 0) {
-            text += " deadline " + ns(m.deadline);
-        }
-        if (m.jitter > 0) {
-            text += " jitter " + ns(m.jitter);
-        }
-        for (std::size_t i = 0; i < m.fields.size(); ++i) {
-            text +=
-                (i == 0 ? " fields " : ",") + m.fields[i].name + ":" + to_string(m.fields[i].type);
-        }
-        text += "\n";
+        text += line_of(m, t) + "\n";
     }
     return text;
 }
