@@ -63,6 +63,7 @@ struct Signal {
     hal_type type = HAL_TYPE_BIT;
     std::vector<Pin*> pins;  ///< in order of linking
     Pin* writer = nullptr;  ///< the OUT pin
+    bool had_writer = false;  ///< after the last commit
     std::uint32_t readers = 0;
     std::uint32_t ios = 0;
     /// kept here while no thread writes it (sets, inherited values)

@@ -329,6 +329,14 @@ inline constexpr CodePage code_pages[] = {
      "several lines, but for the netlist or the INI file "
      "it is one, so it is rejected. Further lines with the same error are not listed.\n\n"
      "`tr '\\r' '\\n' < OLD > NEW` converts a file whose lines end in CR only."},
+    {"lost-writer",
+     "The edit has taken the only writer of a signal: by unload, by unlinkp, or because its program "
+     "ended. Pins that read the signal keep the value it has from then on, as in LinuxCNC, which "
+     "does not mention it. The value is the safe value of the writer where it declares one (`hal "
+     "doc COMPONENT`), as outputs of the components for safety do; otherwise it is the last one, "
+     "so that an enable may stay TRUE.\n\n"
+     "Link another writer or set a value. An edit that replaces the writer at once, between `begin` "
+     "and `commit` or in a file, causes no warning."},
     {"matrix-text",
      "A matrix file contains `NAME = ` followed by numbers: one row per line, or `;` between rows; "
      "spaces or commas between numbers. "

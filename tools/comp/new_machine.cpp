@@ -17,7 +17,7 @@ constexpr std::string_view axis_letters = "xyzabcuvw";
 // clang-format off: templates
 
 constexpr std::string_view loads = R"HAL(loadrt estop_latch names=estop
-loadrt and2 names=chain
+loadrt interlock names=chain inputs=2
 loadrt not names=each(@A@-idle)
 loadrt mux2 names=each(@A@-source)
 loadrt limit3 names=each(@A@-path)
@@ -36,9 +36,9 @@ addf @A@-there servo-thread
 
 constexpr std::string_view chain_nets = R"HAL(
 # Everything is off until the chain is closed and `reset` becomes TRUE.
-net chain-closed => chain.in0
-net chain-ok chain.out => estop.ok-in
-net reset => estop.reset
+net chain-closed => chain.in-00
+net chain-ok chain.ok => estop.ok-in
+net reset => chain.reset estop.reset
 )HAL";
 
 // While the axis is off its path follows the position, so that it does not jump when it is enabled.
@@ -110,7 +110,7 @@ loadrt integ names=each(@A@-motor)   # a motor whose speed is its input
 )HAL",
      "", "",
      "addf @A@-pid.do-pid-calcs servo-thread\naddf @A@-motor servo-thread\n", "", "",
-     "net bus-ok => chain.in1\nsets bus-ok TRUE\nnet enable estop.ok-out\n", motor_nets,
+     "net bus-ok => chain.in-01\nsets bus-ok TRUE\nnet enable estop.ok-out\n", motor_nets,
      "P = 20\n", "", "", "",
      "Replace `integ` by the components of your hardware: an output for `x-effort`, an encoder for `x-position`."},
     {"canopen", 3, "@A@-active",
@@ -121,7 +121,7 @@ loadrt cia402 names=@ALL@
      "addf canopen.0.receive servo-thread\n", "addf @A@.read-all servo-thread\n",
      "addf @A@.write-all servo-thread\n", "addf canopen.0.transmit servo-thread\n",
      "addf canopen-drive.@N@.update servo-thread\n",
-     "net bus-ok canopen.0.operational => chain.in1\nnet enable estop.ok-out\n", drive_nets,
+     "net bus-ok canopen.0.operational => chain.in-01\nnet enable estop.ok-out\n", drive_nets,
      "SCALE = 1000\n", "canopen",
      R"TXT(# SPDX-License-Identifier: MIT
 [bus]
@@ -148,7 +148,7 @@ loadrt cia402 names=@ALL@
      "addf ethercat.0.receive servo-thread\n", "addf @A@.read-all servo-thread\n",
      "addf @A@.write-all servo-thread\n",
      "addf ethercat.0.transmit servo-thread\naddf ethercat-segment.0.update servo-thread\n", "",
-     "net bus-ok ethercat.0.all-op => chain.in1\nnet enable estop.ok-out\n", drive_nets,
+     "net bus-ok ethercat.0.all-op => chain.in-01\nnet enable estop.ok-out\n", drive_nets,
      "SCALE = 1000\n", "ethercat",
      R"TXT(# SPDX-License-Identifier: MIT
 [bus]
@@ -180,7 +180,8 @@ In another terminal close the chain, switch on, and move:
     hal shell sets x-target 10
     hal watch x-position @ACTIVE@
 
-`sets chain-closed FALSE` stops all axes. They stay off until the chain is closed and `reset` becomes TRUE again.
+`sets chain-closed FALSE` stops all axes. They stay off until the chain is closed and `reset` becomes TRUE again. `hal shell getp chain.first` prints which of
+the conditions of the chain opened first: 0 is `chain-closed`, 1 is `bus-ok`.
 
 * `@NAME@.hal` is the netlist, and `@NAME@.ini` has the settings of the axes.
 * `test.hal` is the test. This prints nothing when it passes:

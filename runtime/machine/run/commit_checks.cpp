@@ -36,6 +36,7 @@ void CommitChecks::run(const Model& model, Scope scope, Diagnostics& diagnostics
     check_all(model, scope, found);
     forget_fixed(found, scope.whole);
     report_removed_functions(model, diagnostics);
+    check_lost_writers(model, diagnostics);
     for (const Diagnostic& one : found.all()) {
         const bool is_new = reported_.emplace(one.message, scope.whole).second;
         if (is_new || (one.severity == Severity::error && !scope.complete)) {

@@ -33,11 +33,15 @@ void make_abandoned_safe(const Model& model, const Edit& edit) noexcept {
     }
 }
 
-void note_functions_in_threads(Model& model) {
+/// What the check of the next transaction compares with.
+void note_committed(Model& model) {
     for (const auto& component : model.components) {
         for (const auto& function : component->functions) {
             function->was_in_thread = function->thread != nullptr;
         }
+    }
+    for (const auto& signal : model.signals) {
+        signal->had_writer = signal->writer != nullptr;
     }
 }
 
@@ -290,7 +294,7 @@ bool OpenTransaction::restore_threads(Diagnostics& diagnostics) {
 /// The transaction is over, one way or the other: what is no longer in the model is destroyed.
 void OpenTransaction::close_edit() {
     if (edit_->structural()) {
-        note_functions_in_threads(state_.model);
+        note_committed(state_.model);
     }
     state_.faults.collect();  // before the plugins whose texts they use
     auto& removed = edit_->removed();

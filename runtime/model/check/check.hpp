@@ -26,6 +26,8 @@ enum class Unthreaded {
 };
 /// warning unthreaded-function
 void check_unthreaded_functions(const Model& model, Unthreaded which, Diagnostics& diagnostics);
+/// warning lost-writer: signals that had a writer after the last commit and have readers only
+void check_lost_writers(const Model& model, Diagnostics& diagnostics);
 /// note cross-thread-io
 void check_cross_thread_io(const Model& model, Diagnostics& diagnostics);
 void check_stale_reads(const Model& model, Diagnostics& diagnostics);  ///< note stale-read

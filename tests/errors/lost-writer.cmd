@@ -1,0 +1,1 @@
+hal sim -q lost-writer.hal --for 1ms
