@@ -197,17 +197,15 @@ private:
     void state(std::size_t begin, std::size_t sign, std::size_t end) {
         const Words name = word(begin, sign);
         if (!fresh(name, max_slopes, states.size(), "states")) return;
-        const std::size_t sigma = keyword(sign + 1, end, "sigma");
-
-        const std::size_t noise = keyword(sign + 1, end, "noise");
+        const std::size_t sigma = keyword(sign + 1, end, sigma_key);
+        const std::size_t noise = keyword(sign + 1, end, noise_key);
         if (sigma == end || noise == end || noise < sigma) {
             return report_at(name.begin, end, "a state needs a start value, sigma and noise",
                              "write state " + std::string(piece(name)) + " = 0 sigma 1 noise 0.1");
         }
         const double start = fixed(trim(sign + 1, sigma));
-        const double wide = fixed(trim(sigma + 5, noise));
-
-        const double wanders = fixed(trim(noise + 5, end));
+        const double wide = fixed(trim(sigma + sigma_key.size(), noise));
+        const double wanders = fixed(trim(noise + noise_key.size(), end));
         if (wide < 0.0 || wanders < 0.0) {
             report_at(sigma, end, "sigma or noise is negative",
                       "write 0 for an exact start value, and for a state without noise");
@@ -253,20 +251,23 @@ private:
         if (measures.size() >= max_measures) {
             return report_at(name.begin, name.end, "more than 12 measurements", "reduce the model");
         }
-        const std::size_t sigma = keyword(sign + 1, end, "sigma");
-
-        const std::size_t wrap = keyword(sign + 1, end, "wrap");
+        const std::string start = "write measure " + std::string(piece(name)) + " = FORMULA ";
+        const std::size_t sigma = keyword(sign + 1, end, sigma_key);
+        const std::size_t wrap = keyword(sign + 1, end, wrap_key);
         if (sigma == end) {
-            return report_at(name.begin, end, "a measurement needs a sigma",
-                             "write measure " + std::string(piece(name)) + " = FORMULA sigma 0.01");
+            return report_at(name.begin, end, "a measurement needs a sigma", start + "sigma 0.01");
         }
-        Measure m{std::string(piece(name)), fixed(trim(sigma + 5, wrap)), 0.0, {}};
+        if (wrap < sigma) {
+            return report_at(wrap, end, "wrap is the last part of a measurement",
+                             start + "sigma 0.01 wrap");
+        }
+        Measure m{std::string(piece(name)), fixed(trim(sigma + sigma_key.size(), wrap)), 0.0, {}};
         if (!(m.sigma > 0.0)) {
             report_at(sigma, end, "sigma must be positive",
                       "write the noise of the measurement, as in sigma 0.01");
         }
         if (wrap != end) {
-            const Words period = trim(wrap + 4, end);
+            const Words period = trim(wrap + wrap_key.size(), end);
             m.wrap = period.begin == period.end ? 2.0 * std::numbers::pi : fixed(period);
             if (!(m.wrap > 0.0)) {
                 report_at(wrap, end, "the wrap period must be positive",
@@ -276,6 +277,10 @@ private:
         formula(trim(sign + 1, sigma), m.value);
         measures.push_back(std::move(m));
     }
+
+    static constexpr std::string_view sigma_key = "sigma";
+    static constexpr std::string_view noise_key = "noise";
+    static constexpr std::string_view wrap_key = "wrap";
 
     std::string_view text_;
     std::map<std::string, std::uint16_t> index_;

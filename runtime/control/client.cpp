@@ -47,6 +47,10 @@ struct Client::State {
 
     ~State() { lose(); }
 
+    /// Returns the object that a machine sends first, without an id; null when none comes within
+    /// 5 s.
+    Json read_hello();
+
     void lose() {
         if (fd < 0) return;
         close(fd);
@@ -165,6 +169,50 @@ struct Client::State {
 Client::Client() : state_(new State) {}
 Client::~Client() = default;
 
+namespace {
+
+/// Returns why no connection to the instance was made. `error`: of connect().
+std::string reason_of(int error, std::string_view instance) {
+    const std::string name = "instance '" + std::string(instance) + "' ";
+    const std::string group = group_without_user(instance);
+    if (!group.empty()) {
+        return name + "is shared with the group '" + group +
+               "', which you are not in; type: sudo adduser $USER " + group + ", then log in again";
+    }
+    if (error == EACCES || error == EPERM) return name + "belongs to another user";
+    const auto running = running_instances();
+    return "no " + name + "is running; " +
+           (running.empty() ? "start one with `hal run FILE.hal`"
+                            : "running: " + listed(running) + " (choose with --name)");
+}
+
+}  // namespace
+
+Json Client::State::read_hello() {
+    using namespace std::chrono;
+    const auto deadline = steady_clock::now() + 5s;
+    while (fd >= 0 && in.find('\n') == std::string::npos) {
+        const auto left = ceil<milliseconds>(deadline - steady_clock::now());
+        pollfd ready{fd, POLLIN, 0};
+        const int events = left > 0ms ? poll(&ready, 1, static_cast<int>(left.count())) : 0;
+        if (events == 0) return nullptr;
+        if (events < 0) continue;  // interrupted
+        std::array<char, 512> part;
+        const ssize_t got = recv(fd, part.data(), part.size(), 0);
+        if (got > 0) {
+            in.append(part.data(), static_cast<std::size_t>(got));
+        } else if (got == 0 || errno != EINTR) {
+            lose();
+        }
+    }
+    const auto end = in.find('\n');
+    if (end == std::string::npos) return nullptr;
+    const auto last = in.begin() + static_cast<std::ptrdiff_t>(end);
+    Json hello = Json::parse(in.begin(), last, nullptr, false);
+    in.erase(0, end + 1);
+    return hello;
+}
+
 std::unique_ptr<Client> Client::connect(std::string_view instance, std::string& problem) {
     std::unique_ptr<Client> client(new Client);
     State& s = *client->state_;
@@ -180,44 +228,16 @@ std::unique_ptr<Client> Client::connect(std::string_view instance, std::string& 
     s.fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
     if (s.fd < 0 ||
         ::connect(s.fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
-        const int error = errno;
-        const std::string group = group_without_user(instance);
-        if (!group.empty()) {
-            problem = "instance '" + s.instance + "' is shared with the group '" + group +
-                      "', which you are not in; type: sudo adduser $USER " + group +
-                      ", then log in again";
-        } else if (error == EACCES || error == EPERM) {
-            problem = "instance '" + s.instance + "' belongs to another user";
-        } else {
-            const auto running = running_instances();
-            problem = "no instance '" + s.instance + "' is running; " +
-                      (running.empty() ? "start one with `hal run FILE.hal`"
-                                       : "running: " + listed(running) + " (choose with --name)");
-        }
+        problem = reason_of(errno, instance);
         return nullptr;
     }
-    Json hello;
-    while (s.fd >= 0 && s.in.find('\n') == std::string::npos) {
-        // The hello is read by hand: it has no id.
-        std::array<char, 512> part;
-        pollfd ready{s.fd, POLLIN, 0};
-        if (poll(&ready, 1, 5000) == 0) break;
-        const ssize_t got = recv(s.fd, part.data(), part.size(), 0);
-        if (got > 0) {
-            s.in.append(part.data(), static_cast<std::size_t>(got));
-        } else if (got == 0 || errno != EINTR) {
-            s.lose();
-        }
+    const Json hello = s.read_hello();
+    if (!hello.is_object()) {
+        problem = "instance '" + s.instance + "' does not answer";
+        return nullptr;
     }
-    if (const auto end = s.in.find('\n'); end != std::string::npos) {
-        hello = Json::parse(s.in.begin(), s.in.begin() + static_cast<std::ptrdiff_t>(end), nullptr,
-                            false);
-        s.in.erase(0, end + 1);
-    }
-    if (!hello.is_object() || hello.value("halcyon", 0) != 1) {
-        problem = hello.is_object()
-                      ? "instance '" + s.instance + "' uses another version of the protocol"
-                      : "instance '" + s.instance + "' does not answer";
+    if (hello.value("halcyon", 0) != 1) {
+        problem = "instance '" + s.instance + "' uses another version of the protocol";
         return nullptr;
     }
     s.version = hello.value("version", "");

@@ -2,6 +2,14 @@
 // The control server: what clients can do, and that the machine keeps running whatever they do.
 #include "shell_server.hpp"
 
+#include <csignal>
+
+#include <sys/socket.h>
+#include <sys/time.h>
+#include <sys/un.h>
+
+#include "machine/processes/address.hpp"
+
 namespace hal::test {
 namespace {
 
@@ -359,6 +367,48 @@ TEST_F(ServerTest, a_reserved_place_is_not_kept_by_a_subscription) {
     EXPECT_TRUE(eventually([&] { return server->counts().requests == 2; }));
     EXPECT_EQ(client()->run("getp a.out").out, "FALSE\n");
     EXPECT_EQ(server->counts().reclaimed, 1U);
+}
+
+/// Interrupts the system calls of this thread, each 50 ms, while it exists.
+class Interruptions {
+public:
+    Interruptions() {
+        struct sigaction ignored{};
+        ignored.sa_handler = [](int) {};  // without SA_RESTART
+        sigaction(SIGALRM, &ignored, &before_);
+        set(50'000);
+    }
+    ~Interruptions() {
+        set(0);
+        sigaction(SIGALRM, &before_, nullptr);
+    }
+
+private:
+    static void set(suseconds_t us) {
+        const itimerval period{{0, us}, {0, us}};
+        setitimer(ITIMER_REAL, &period, nullptr);
+    }
+
+    struct sigaction before_{};
+};
+
+TEST_F(ServerTest, a_machine_that_says_nothing_does_not_answer_also_when_waiting_is_interrupted) {
+    serve();
+    const std::string path = found_socket("test");
+    server.reset();
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    path.copy(address.sun_path, sizeof address.sun_path - 1);
+    const int silent = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    ASSERT_EQ(bind(silent, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+    ASSERT_EQ(listen(silent, 1), 0);
+    std::string problem;
+    {
+        const Interruptions interruptions;
+        EXPECT_EQ(Client::connect("test", problem), nullptr);
+    }
+    EXPECT_EQ(problem, "instance 'test' does not answer");
+    close(silent);
 }
 
 }  // namespace

@@ -149,10 +149,10 @@ public:
             return true;
         } catch (const std::exception& why) {
             if (!failure_reported_) {
-                std::fputs((std::string("dds: cannot announce this process again: ") + why.what() +
-                            "; retrying every second\n")
-                               .c_str(),
-                           stderr);
+                std::fprintf(stderr,
+                             "dds: cannot announce this process again: %s; retrying every "
+                             "second\n",
+                             why.what());
             }
             failure_reported_ = true;
             unmake();

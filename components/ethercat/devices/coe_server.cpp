@@ -106,6 +106,7 @@ void CoeServer::upload_segment(std::uint8_t command, Outbox& out) noexcept {
 void CoeServer::download(const coe::Sdo& r, std::span<const std::uint8_t> payload, State state,
                          Outbox& out) noexcept {
     toggle_ = false;
+    // ETG.1000.6, "SDO download normal response": as in the request
     const auto accepted =
         static_cast<std::uint8_t>(sdo::download_response | (complete_ ? sdo::complete : 0));
     if (r.expedited()) {
@@ -129,7 +130,7 @@ void CoeServer::download(const coe::Sdo& r, std::span<const std::uint8_t> payloa
     std::memcpy(buffer_.data(), data.data(), at_);
     if (at_ < length_) {
         transfer_ = Transfer::download;
-        return respond(sdo::download_response, 0, out);
+        return respond(accepted, 0, out);
     }
     if (finish_download(state, out)) {
         respond(accepted, 0, out);

@@ -144,6 +144,10 @@ int fail_mailbox(const Options& options, const BusSlave& s, const std::string& w
                                      result.abort, ethercat::coe::abort_text(result.abort)));
 }
 
+void fail_unfinished(const Options& options, const BusSlave& s, const std::string& what) {
+    fail(options, fmt::format("slave {}: {}: not finished within 60 s", s.position, what));
+}
+
 /// Returns whether the machine behind a gateway has closed the connection, after printing it.
 bool gateway_is_lost(const EthercatValueOptions& options, const EthercatSession& session) {
     if (!session.gateway_lost()) return false;
@@ -152,19 +156,26 @@ bool gateway_is_lost(const EthercatValueOptions& options, const EthercatSession&
     return true;
 }
 
-/// Returns the type that --type names, or that the slave reports, else that of plain bytes; nullptr
-/// after printing the reason. `must_be_known`: fails when the slave does not answer.
-const ValueType* type_of(const EthercatValueOptions& options, EthercatSession& session,
-                         const BusSlave& s, std::uint16_t index, std::uint8_t sub,
-                         bool must_be_known) {
-    if (!options.type.empty()) {
-        const ValueType* const named = find_row(value_types, options.type, &ValueType::name);
-        if (named != nullptr) return named;
+/// The last row: for a type that nobody knows.
+const ValueType& plain_bytes() { return value_types[std::size(value_types) - 1]; }
+
+/// Returns the type of --type; nullptr after printing that there is none of this name.
+const ValueType* named_type(const EthercatValueOptions& options) {
+    const ValueType* const named = find_row(value_types, options.type, &ValueType::name);
+    if (named == nullptr) {
         fail(options,
              fmt::format("unknown type '{}'; see: hal help ethercat upload", options.type));
-        return nullptr;
     }
-    Bytes name(256);
+    return named;
+}
+
+/// Returns the type that the slave reports, or plain_bytes(); nullptr after printing the reason.
+/// `must_be_known`: fails when the slave does not answer.
+const ValueType* reported_type(const EthercatValueOptions& options, EthercatSession& session,
+                               const BusSlave& s, std::uint16_t index, std::uint8_t sub,
+                               bool must_be_known) {
+    constexpr std::size_t max_name = 256;
+    Bytes name(max_name);
     MailboxRequest request;
     request.kind = MailboxRequest::Kind::entry;
     request.slave = s.number;
@@ -173,18 +184,21 @@ const ValueType* type_of(const EthercatValueOptions& options, EthercatSession& s
     request.data = name;
     const bool has_finished = session.run(request);
     if (gateway_is_lost(options, session)) return nullptr;
+    if (has_finished && request.result) {
+        const ValueType* const type =
+            find_row(value_types, request.entry.type, &ValueType::coe_type);
+        return type != nullptr ? type : &plain_bytes();
+    }
     const Outcome outcome = has_finished ? request.result.outcome : Outcome::timed_out;
     const bool answers = outcome != Outcome::timed_out && outcome != Outcome::lost;
-    if (must_be_known && has_finished && !answers) {
-        fail_mailbox(options, s,
-                     fmt::format("the type of 0x{:04X}:{} (--type names it)", index, sub),
-                     request.result);
-        return nullptr;
+    if (answers || !must_be_known) return &plain_bytes();  // it need not describe its objects
+    const std::string what = fmt::format("the type of 0x{:04X}:{} (--type names it)", index, sub);
+    if (has_finished) {
+        fail_mailbox(options, s, what, request.result);
+    } else {
+        fail_unfinished(options, s, what);
     }
-    const bool is_known = has_finished && request.result;
-    const ValueType* const reported =
-        is_known ? find_row(value_types, request.entry.type, &ValueType::coe_type) : nullptr;
-    return reported != nullptr ? reported : &value_types[std::size(value_types) - 1];
+    return nullptr;
 }
 
 /// An object of a slave, and the type of its value.
@@ -222,7 +236,9 @@ std::optional<SlaveObject> find_object(const EthercatValueOptions& options,
     object.sub = static_cast<std::uint8_t>(*sub);
     object.slave = session.chosen(options);
     if (object.slave == nullptr) return std::nullopt;
-    object.type = type_of(options, session, *object.slave, object.index, object.sub, download);
+    object.type = options.type.empty() ? reported_type(options, session, *object.slave,
+                                                       object.index, object.sub, download)
+                                       : named_type(options);
     if (object.type == nullptr) return std::nullopt;
     return object;
 }
@@ -238,8 +254,7 @@ bool transfer(const EthercatValueOptions& options, EthercatSession& session,
     request.sub = object.sub;
     request.data = bytes;
     if (!session.run(request)) {
-        fail(options, fmt::format("slave {}: {}: not finished within 60 s", object.slave->position,
-                                  object.label()));
+        fail_unfinished(options, *object.slave, object.label());
         return false;
     }
     if (gateway_is_lost(options, session)) return false;
