@@ -53,6 +53,7 @@ Script::Script(Shell& shell, Shell::State& state, Output& output)
       lock_(state.session.lock()),
       texts_(shell, state),
       effects_(shell, state, output, lock_),
+      logged_edits_(session_.event_log()),
       collected_before_(state.collected.size()) {}
 
 Script::~Script() { transaction_.reset(); }
@@ -194,9 +195,8 @@ void Script::run_line(const Command& command) {
     }
     const CommandRow* const row = row_of(command);
     if (!row) return report_unknown(command);
-    if (session_.event_log().wanted() && !only_looks(*row, command)) {
-        session_.event_log().add(row->edits() ? "edit" : "command",
-                                 std::string(session_.sources.text(command.span)));
+    if (session_.event_log().wanted() && !row->edits() && !only_looks(*row, command)) {
+        session_.event_log().add("command", std::string(session_.sources.text(command.span)));
     }
     if (!row->edits() && !check_arity(row->usage(), command.name, command.args, pending_)) {
         return effects_.add_line(command.span);
@@ -233,6 +233,7 @@ Transaction& Script::transaction() {
 
 void Script::edit(const Command& command, const CommandRow& row) {
     effects_.add_line(command.span);
+    logged_edits_.add(session_.sources.text(command.span));
     if (!check_lock(row, command, locks(), session_.model(), pending_)) return;
     if (merge_module_load(command)) return;
     ++edits_;
@@ -259,6 +260,7 @@ bool Script::merge_module_load(const Command& command) {
 
 void Script::defer(const Command& command, const CommandRow& row) {
     effects_.add_line(command.span);
+    logged_edits_.add(session_.sources.text(command.span));
     if (!check_lock(row, command, locks(), session_.model(), pending_)) return;
     ++edits_;
     if (!locks_) {
@@ -283,15 +285,26 @@ void Script::act(const Command& command, const CommandRow& row) {
     }
     const std::size_t errors_before = pending_.errors();
     if (!check_lock(row, command, locks(), session_.model(), pending_)) {
+        log_failure(command, errors_before);
         effects_.add_line(command.span);
         return finish();
     }
     act_on_each(command, row);
+    if (!looks) {
+        log_failure(command, errors_before);
+    }
     if (looks && !pending_.failed() && session_.ending()) {
         report_end(command);  // what it has printed may be incomplete
     }
     keep_remembered(command, row);
     note_effect(command, row, apart, pending_.errors() > errors_before);
+}
+
+/// Adds to the event log that a command which acts has failed, when it has.
+void Script::log_failure(const Command& command, std::size_t errors_before) {
+    if (!session_.event_log().wanted() || pending_.errors() <= errors_before) return;
+    session_.event_log().add(
+        "failed", failure_text(session_.sources.text(command.span), pending_, errors_before));
 }
 
 /// Notes what `hal check` does not carry out. Returns whether the command is checked.
@@ -547,6 +560,7 @@ void Script::finish() {
     Diagnostics found;
     found.take(pending_);
     const bool failed = found.failed() || (open && !took_effect);
+    logged_edits_.finish(found, failed);
     effects_.report(found, outcome_of(edits, took_effect, failed));
     if (!failed) return;
     failed_ = true;

@@ -21,6 +21,7 @@
 #include "commands/script_texts.hpp"
 #include "commands/shell_state.hpp"
 #include "commands/table.hpp"
+#include "machine/report/logged_edits.hpp"
 
 namespace hal {
 
@@ -67,6 +68,7 @@ private:
     bool merge_module_load(const Command& command);
     void defer(const Command& command, const CommandRow& row);
     void act(const Command& command, const CommandRow& row);
+    void log_failure(const Command& command, std::size_t errors_before);
     bool begin_check(const Command& command, const CommandRow& row);
     void keep_remembered(const Command& command, const CommandRow& row);
     void note_effect(const Command& command, const CommandRow& row, bool apart, bool failed);
@@ -106,6 +108,7 @@ private:
     SessionLock lock_;
     ScriptTexts texts_;
     ScriptEffects effects_;
+    LoggedEdits logged_edits_;
     std::optional<Transaction> transaction_;
     Diagnostics pending_;  ///< of the open transaction
     std::size_t edits_ = 0;  ///< in it

@@ -11,6 +11,7 @@
 #include "commands/json_text.hpp"
 #include "commands/table.hpp"
 #include "control/request.hpp"
+#include "machine/report/logged_edits.hpp"
 
 namespace hal {
 namespace {
@@ -55,16 +56,18 @@ void ValueRequests::set(const Json& body, std::string& reply) {
     }
     const auto lock = session_.lock();
     Diagnostics diagnostics;
+    LoggedEdits logged(session_.event_log());
     Transaction transaction = session_.begin();
     for (Command& command : commands) {
         resolve_set(session_.model(), command);
         const CommandRow& row = *find_command(command.name.text);
+        logged.add(command.name.text + " " + command.args[0].text + " " + command.args[1].text);
         if (!check_lock(row, command, session_.locked, session_.model(), diagnostics)) break;
-        session_.event_log().add(
-            "edit", command.name.text + " " + command.args[0].text + " " + command.args[1].text);
         transaction.apply(row.form(), command, diagnostics);
     }
-    if (!transaction.commit(diagnostics)) {
+    const bool took_effect = transaction.commit(diagnostics);
+    logged.finish(diagnostics, !took_effect);
+    if (!took_effect) {
         throw RequestError{render(diagnostics, session_.sources) + "nothing was changed"};
     }
     reply += ",\"count\":" + std::to_string(commands.size());

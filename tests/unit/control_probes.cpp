@@ -121,6 +121,27 @@ TEST_F(ProbeProtocol, the_journal_has_edits_and_commands_but_no_queries) {
     EXPECT_EQ(connection.next_due_ns(), INT64_MAX);
 }
 
+TEST_F(ProbeProtocol, the_journal_tells_rejected_edits_from_others) {
+    ask({{"journal", true}});
+    const auto run = [this](const std::string& text) {
+        TextOutput output;
+        machine.shell.run_text("t.hal", text, output);
+    };
+    run("setp nope 1");
+    run("setp s.in1 4\nsetp s.in2 five\n");
+    run("lock nothing");
+    EXPECT_EQ(ask({{"set", {{"s.out", 1}}}})["ok"], false);
+    std::string events;
+    connection.publish(connection.next_due_ns(), false, events);
+    EXPECT_EQ(events.find(R"("kind":"edit")"), events.npos) << events;
+    for (const char* const entry :
+         {R"("kind":"rejected","text":"setp nope 1: unknown pin 'nope'")",
+          R"("kind":"rejected","text":"2 edits: )", R"("kind":"rejected","text":"lock nothing: )",
+          R"("kind":"rejected","text":"setp s.out 1: )"}) {
+        EXPECT_NE(events.find(entry), events.npos) << entry << "\n" << events;
+    }
+}
+
 TEST_F(ServerTest, a_client_reads_batches_layouts_and_replies_between_them) {
     serve();
     machine->must("start\n");

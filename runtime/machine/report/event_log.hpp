@@ -20,7 +20,7 @@ class FaultLog;
 
 struct LoggedEvent {
     std::int64_t time_ns = 0;  ///< on the machine's clock
-    std::string kind;  ///< fault, edit, command, message
+    std::string kind;  ///< fault, edit, rejected, command, failed, message
     std::string text;
 };
 
