@@ -20,7 +20,8 @@ enum class Failure : std::uint32_t {
     noisy,
     too_long,
     no_oscillation,
-    interrupted
+    interrupted,
+    invalid_setting
 };
 
 struct Identify : hal::Component {
@@ -63,7 +64,7 @@ struct Identify : hal::Component {
         *this, "failure",
         "reason of a failure: 1 value is NaN or infinite, 2 no response, 3 response below the "
         "noise, or relay: switched by it, 4 not settled, 5 no oscillation, 6 interrupted by a "
-        "stop"};
+        "stop, 7 a setting is NaN or infinite"};
     hal::Out<bool> active{*this, "active", "TRUE during an experiment", {.safe = false}};
     hal::Out<double> gain{*this, "gain", "K of K e^(-L s) / (T s + 1)"};
     hal::Out<double> time_constant{
@@ -92,6 +93,9 @@ struct Identify : hal::Component {
         if (running() && !std::isfinite(y)) {
             fail(Failure::not_a_number);
         }
+        if (running() && !has_finite_settings()) {
+            fail(Failure::invalid_setting);
+        }
         time_ += dt;
         switch (state_) {
         case Phase::settling: measure_rest(y); break;
@@ -108,6 +112,12 @@ struct Identify : hal::Component {
 private:
     bool running() const noexcept {
         return state_ == Phase::settling || state_ == Phase::step || state_ == Phase::relay;
+    }
+    /// An experiment with other ones might never end.
+    bool has_finite_settings() const noexcept {
+        const std::array settings{bias.get(),      amplitude.get(), settle_time.get(),
+                                  step_time.get(), setpoint.get(),  hysteresis.get()};
+        return std::ranges::all_of(settings, [](double one) { return std::isfinite(one); });
     }
     double excitation() const noexcept {
         if (state_ == Phase::step) return amplitude;
@@ -505,6 +515,8 @@ amplitudes, so the error of the gain is below 3 %, or 6 % for a plant with domin
 L = 0.1 s). The experiment fails if there is no oscillation within `step-time`. Noise that exceeds `hysteresis` switches the relay, too: failure 3 is an
 oscillation whose period is below 8 cycles of the thread, or of whose power the first harmonic has less than three quarters. Then increase `hysteresis` or
 `amplitude`.
+
+A setting that is NaN or infinite ends an experiment with failure 7, because it might never end.
 
 An experiment does not survive a stop of the machine: `output` is 0 then, and with the next start the experiment has failed.
 

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+#include <cmath>
+
 #include "vision/camera_component.hpp"
 #include "vision/camera_file.hpp"
 #include "vision/detect/marker.hpp"
@@ -29,7 +31,8 @@ class VisionMarker : public CameraComponent<VisionMarker, Found, Settings> {
 public:
     explicit VisionMarker(const hal_host* host) : CameraComponent(host) {
         std::optional<Camera> camera;
-        if (!camera_.get().empty()) {
+        has_pose_ = !camera_.get().empty();
+        if (has_pose_) {
             camera = camera_from(texts(), camera_.get());
             expect(camera->width, camera->height, camera->file);
         }
@@ -45,7 +48,7 @@ public:
             }
         }
         found.count = static_cast<std::uint32_t>(markers.size());
-        if (!best) return;
+        if (!best || (has_pose_ && !is_size(of.size_mm))) return;
         found.found = true;
         found.id = best->id;
         found.pose = best->pose;
@@ -79,7 +82,10 @@ public:
                                  "id of the marker to detect; -1: the lowest id in the frame",
                                  {.initial = -1}};
     hal::In<double> size{
-        *this, "size", "side length of the marker's black square", {.initial = 50.0, .unit = "mm"}};
+        *this,
+        "size",
+        "side length of the marker's black square; not above 0, NaN or infinite: valid is FALSE",
+        {.initial = 50.0, .unit = "mm"}};
     hal::Param<double> max_error{*this,
                                  "max-error",
                                  "maximum error of a valid marker; 0: no limit",
@@ -105,6 +111,8 @@ public:
                                "last frames: 0 unambiguous, 1 ambiguous"};
 
 private:
+    static bool is_size(double mm) noexcept { return std::isfinite(mm) && mm > 0.0; }
+
     hal::TextArgument dictionary_{
         *this, "dictionary", "4x4_50",
         "marker dictionary: 4x4_50, 5x5_100, 6x6_250, apriltag_36h11 ..."};
@@ -115,6 +123,7 @@ private:
         "file with the camera's calibration, relative to the netlist; required for the pose",
         {.per_instance = true}};
     std::optional<MarkerDetector> detector_;  // of the helper thread, once started
+    bool has_pose_ = false;                   // a camera is given
 };
 
 }  // namespace

@@ -77,7 +77,14 @@ start 0
 hal_link: 'sum.in0': only while a module is loaded, in rtapi_app_main
 unlink 0 0, delete 0 -22, link -1, made 0
 """
-        self.assertEqual(2 * (said + ended), done.stderr)  # the second time as the first
+        warning = f"""{self.folder}/m.hal:3:8: warning: signal 'w' has no writer any more: its readers keep the value it has [lost-writer]
+    3 | loadrt wires
+      |        ^^^^^
+      = help: net w PIN gives it another writer, sets w VALUE a value
+
+1 warning; the edit took effect
+"""
+        self.assertEqual(said + ended + warning + said + ended, done.stderr)
 
     def test_what_a_module_did_is_undone_when_its_load_fails(self):
         self.build("wires")

@@ -287,6 +287,7 @@ class Reload(Case):
         second = self.mapped(machine)
         self.assertEqual(1, len(second), "the old version is unloaded")
         self.assertNotEqual(first, second)
+        self.say("-e", "begin", "-e", "unlinkp p.out", "-e", "unlinkp adder.in0", "-e", "commit")
         self.say("unload", "part")
         self.assertEqual(set(), self.mapped(machine))
         self.say("loadrt", "part", "names=p")
@@ -322,7 +323,9 @@ class Reload(Case):
                 self.assertIn(words, self.refused("reload", "part"))
         wait_until(lambda: self.value("p.out") == "6", "the first version runs on")
         self.install("retyped")
-        self.say("-e", "begin", "-e", "unlinkp p.out", "-e", "reload part", "-e", "commit")
+        done = self.shell("-e", "begin", "-e", "unlinkp p.out", "-e", "reload part", "-e", "commit")
+        self.assertEqual(0, done.returncode, done.stderr)
+        self.assertIn("signal 'result' has no writer any more", done.stderr)
         wait_until(
             lambda: self.value("p.out") == "1", "with the pin off its signal it can be replaced"
         )

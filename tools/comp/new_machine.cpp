@@ -122,7 +122,7 @@ loadrt cia402 names=@ALL@
      "addf @A@.write-all servo-thread\n", "addf canopen.0.transmit servo-thread\n",
      "addf canopen-drive.@N@.update servo-thread\n",
      "net bus-ok canopen.0.operational => chain.in-01\nnet enable estop.ok-out\n", drive_nets,
-     "SCALE = 1000\n", "canopen",
+     "SCALE = 100\n", "canopen",  // the simulated drive has 50 revolutions of 4096 counts
      R"TXT(# SPDX-License-Identifier: MIT
 [bus]
 link = sim:@NAME@

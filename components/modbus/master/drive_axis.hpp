@@ -24,6 +24,7 @@ public:
         double speed_rpm = 0.0;  ///< without sign
         bool has_running = false;  ///< `is_running` has been read
         bool is_running = false;
+        bool reads_fault = false;  ///< `is_faulty` has been read
         bool is_faulty = false;
     };
     struct Outputs {
@@ -50,7 +51,10 @@ public:
     Outputs step(const Inputs& in, const Feedback& feedback, std::int64_t now_ns) noexcept {
         const bool lost_speed = had_speed_ && !feedback.has_speed;
         had_speed_ = feedback.has_speed;
-        if (!feedback.is_online || feedback.is_faulty || lost_speed) {
+        // a trip that is not read leaves the drive commanded: the reset must not start it
+        const bool resets_unread = in.reset && !was_reset_ && !feedback.reads_fault;
+        was_reset_ = in.reset;
+        if (!feedback.is_online || feedback.is_faulty || lost_speed || resets_unread) {
             require_edge();
         } else if (in.run && !was_run_) {
             may_run_ = true;
@@ -107,6 +111,7 @@ private:
     bool may_run_ = false;
     bool had_speed_ = false;
     bool was_run_ = true;  // a machine that starts with `run` TRUE waits for an edge
+    bool was_reset_ = true;
     bool turns_back_ = false;
     double speed_ = 0.0;
     std::uint32_t direction_ = drive_stop;

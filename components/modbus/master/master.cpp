@@ -1036,16 +1036,19 @@ void Master::make_drive(const Telegram& t) noexcept {
     const bool stops = (command & 3U) == drive_stop;
     const bool command_changed = !own.is_sent || sent_command != command;
     const bool speed_changed = !own.is_sent || own.sent[1] != job_.cells[1];
-    if (((sent_command ^ command) & drive_reset) != 0) {
-        add_reset(drive, (command & drive_reset) != 0);
+    const bool changes_reset = ((sent_command ^ command) & drive_reset) != 0;
+    const bool begins_reset = changes_reset && (command & drive_reset) != 0;
+    if (begins_reset && stops && (sent_command & 3U) != drive_stop) {
+        add_writes(drive.stop);  // first: a reset must not start what is still commanded
+    }
+    if (changes_reset) {
+        add_reset(drive, begins_reset);
     }
     if (!stops && speed_changed) {
         add_speed(drive, rpm);
     }
     if (command_changed) {
-        for (const Write& write : writes_of(drive, command & 3U)) {
-            add_write(write);
-        }
+        add_writes(writes_of(drive, command & 3U));
     }
     if (stops && (speed_changed || command_changed)) {
         add_speed(drive, 0.0);
@@ -1079,6 +1082,12 @@ void Master::add_reset(const Drive& drive, bool begins) noexcept {
             write.value = 0;
             add_write(write);
         }
+    }
+}
+
+void Master::add_writes(const std::vector<Write>& writes) noexcept {
+    for (const Write& write : writes) {
+        add_write(write);
     }
 }
 

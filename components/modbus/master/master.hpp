@@ -178,6 +178,7 @@ private:
     void make_drive(const Telegram& t) noexcept;
     void make_drive_of_coils(const Drive& drive) noexcept;
     void add_reset(const Drive& drive, bool begins) noexcept;
+    void add_writes(const std::vector<Write>& writes) noexcept;
     void add_write(const Write& write) noexcept;
     void add_speed(const Drive& drive, double rpm) noexcept;
 

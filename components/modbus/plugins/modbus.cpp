@@ -80,6 +80,7 @@ struct Modbus : hal::bus::BusComponent {
         followed_.attach(image_, arguments_.bus, arguments_.plan);
         setup_time_.start();
         begin_cycles();
+        receive_was_missing_ = false;
         is_alive_.store(true);
         is_stopped_by_another_ = false;
         guardian_stalls_.store(false);
@@ -144,10 +145,13 @@ struct Modbus : hal::bus::BusComponent {
     }
 
     void transmit(hal::Cycle cycle) noexcept {
-        if (!has_image_ || !functions_.transmit(cycle)) return;
+        if (!has_image_) return;
+        const bool is_paired = functions_.transmit(cycle);
+        follow_estop();
+        follow_receive(cycle);
+        if (!is_paired) return;
         const std::int64_t now = cycle.start_ns();
         ImageHeader& header = image_.header();
-        follow_estop();
         followed_.take();
         const ImageHeader& seen = followed_.seen().header();
         const bool may_run = exchanges() &&
@@ -423,6 +427,16 @@ private:
         load_busy_ = busy;
     }
 
+    /// Drives keep their last command: without receive() they are stopped, and start with another
+    /// edge once it is back.
+    void follow_receive(hal::Cycle cycle) noexcept {
+        const bool is_missing = functions_.receive_is_missing();
+        if (is_missing && !receive_was_missing_) {
+            make_safe(cycle);
+        }
+        receive_was_missing_ = is_missing;
+    }
+
     void follow_estop() noexcept {
         ImageHeader& header = image_.header();
         if (estop && !was_estop_) {
@@ -492,6 +506,7 @@ private:
     std::int64_t guardian_silent_ns_ = 0;
     bool is_virtual_ = false;
     bool has_guardian_ = false;
+    bool receive_was_missing_ = false;
     bool was_estop_ = false;
     std::int64_t shown_ns_ = 0;
     int lasting_faults_ = 0;

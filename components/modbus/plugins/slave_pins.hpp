@@ -232,6 +232,7 @@ public:
         feedback.speed_rpm = number(image, speed_);
         feedback.has_running = running_ != no_value;
         feedback.is_running = bit(image, running_);
+        feedback.reads_fault = fault_ != no_value;
         feedback.is_faulty = bit(image, fault_);
         const DriveAxis::Outputs out =
             axis_->step({drive_->run, drive_->speed_cmd, drive_->reset}, feedback, now_ns);

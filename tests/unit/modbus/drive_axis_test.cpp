@@ -94,6 +94,19 @@ TEST_F(SpindlePins, a_drive_that_waits_for_an_edge_is_not_at_speed) {
     EXPECT_TRUE(is_at_speed(true, 1000));
 }
 
+TEST_F(SpindlePins, a_reset_of_a_drive_whose_trip_is_not_read_needs_an_edge) {
+    const auto resets = [&](bool reads_fault) {
+        seen.reads_fault = reads_fault;
+        start();
+        EXPECT_TRUE(is_at_speed(true, 1000));
+        last = axis.step({true, speed, true}, seen, 0);
+        return last.command;
+    };
+    EXPECT_EQ(resets(false), drive_stop | drive_reset);
+    EXPECT_FALSE(is_at_speed(true, 0)) << "waits for an edge";
+    EXPECT_EQ(resets(true), drive_forward | drive_reset) << "it has not tripped";
+}
+
 TEST_F(SpindlePins, an_old_reading_of_the_speed_is_not_at_speed) {
     start();
     EXPECT_TRUE(is_at_speed(true, 1000));
