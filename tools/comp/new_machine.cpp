@@ -43,12 +43,14 @@ net reset => chain.reset estop.reset
 
 // While the axis is off its path follows the position, so that it does not jump when it is enabled.
 constexpr std::string_view axis_path = R"HAL(
-# @A@: `sets @A@-target 10` moves it, within its speed and acceleration
+# @A@: `sets @A@-target 10` moves it, within its travel, speed and acceleration
 net @A@-position => @A@-source.in0 @A@-there.in1
 net @A@-target => @A@-source.in1 @A@-there.in2
 net @ACTIVE@ => @A@-source.sel @A@-idle.in
 net @A@-track @A@-idle.out => @A@-path.load
 net @A@-wanted @A@-source.out => @A@-path.in
+setp @A@-path.min [JOINT_@N@]MIN_LIMIT
+setp @A@-path.max [JOINT_@N@]MAX_LIMIT
 setp @A@-path.maxv [JOINT_@N@]MAX_VELOCITY
 setp @A@-path.maxa [JOINT_@N@]MAX_ACCELERATION
 setp @A@-there.difference 0.01
@@ -56,7 +58,9 @@ setp @A@-there.difference 0.01
 
 constexpr std::string_view axis_settings = R"INI(
 [JOINT_@N@]
-# @A@
+# @A@: its travel, and how it moves
+MIN_LIMIT = -1000
+MAX_LIMIT = 1000
 MAX_VELOCITY = 100
 MAX_ACCELERATION = 500
 )INI";

@@ -287,7 +287,7 @@ private:
     }
     std::size_t packed_tail_bytes() const noexcept { return settings_.key ? tag_bytes : 0; }
 
-    /// The part of the frame that messages are packed into; empty when there is no room for any.
+    /// The part of the frame that messages are packed into; empty when it can hold none.
     std::span<std::uint8_t> packed_space() noexcept {
         const std::size_t header = packed_header_bytes();
         const std::size_t tail = packed_tail_bytes();
