@@ -608,7 +608,8 @@ Core::Remains Core::remains() const {
                     .safe = safe_,
                     .in_budget = in_budget_,
                     .passed = passed_.load(),
-                    .stopped = stopped_.load(std::memory_order_acquire)};
+                    .stopped = stopped_.load(std::memory_order_acquire),
+                    .safe_number = safe_number_};
     each_check(plan_,
                [&](const plan::FiniteCheck& check) { remains.bad_outputs.push_back(check.bad); });
     return remains;
@@ -620,6 +621,7 @@ void Core::set_remains(const Remains& remains) {
     const std::size_t functions = plan_ ? plan_->functions.size() : 0;
     sampled_ = remains.sampled < functions ? remains.sampled : 0;
     safe_ = remains.safe;
+    safe_number_ = remains.safe_number;
     in_budget_ = remains.in_budget;
     passed_ = remains.passed;
     stopped_.store(remains.stopped, std::memory_order_release);
@@ -864,14 +866,20 @@ std::int64_t Core::account(std::int64_t woke_ns, bool ran) noexcept {
 }
 
 void Core::make_safe() noexcept {
+    if (!safe_) {
+        safe_number_ = info_.number;
+    }
     safe_ = true;
     if (!plan_ || stopped_.in_copy()) return;
     for (const plan::Safe& safe : plan_->safe) {
         __atomic_store_n(&safe.pin->slot->raw, safe.value.raw, __ATOMIC_RELAXED);
     }
+    // a repetition at the end of the machine has the same number: no function has run in between
+    hal_cycle info = info_;
+    info.number = safe_number_;
     in_emergency_ = true;
     for (const plan::Step& step : plan_->emergency) {
-        step.step(step.self, &info_);
+        step.step(step.self, &info);
     }
     in_emergency_ = false;
 }

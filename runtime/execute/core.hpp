@@ -140,6 +140,7 @@ public:
         bool in_budget = true;
         bool passed = false;
         bool stopped = false;
+        std::uint64_t safe_number = 0;  ///< of the cycle in which the outputs became safe
         std::vector<bool> bad_outputs = {};  ///< of the finite checks, in order
     };
     Remains remains() const;
@@ -356,6 +357,7 @@ private:
     bool reads_itself_ = false;  // not the running function
     bool in_emergency_ = false;
     bool safe_ = true;
+    std::uint64_t safe_number_ = 0;  // of the cycle in which the outputs became safe
     std::size_t sampled_ = 0;
     bool in_budget_ = true;
     ModeCheck modes_;

@@ -25,7 +25,7 @@ constexpr std::uint32_t max_history = 1u << 20;
 
 /// Begins a state with the address of the memory of components. States before it begin with a
 /// number of libraries.
-constexpr std::uint32_t state_format = 0x5348'0002;
+constexpr std::uint32_t state_format = 0x5348'0003;
 
 }  // namespace
 
@@ -261,6 +261,7 @@ void MachineState::put_core(std::string& to, Core& core) {
     for (const bool flag : {remains.safe, remains.in_budget, remains.passed, remains.stopped}) {
         mcap::put(to, static_cast<std::uint8_t>(flag));
     }
+    mcap::put(to, remains.safe_number);
     mcap::put(to, static_cast<std::uint32_t>(remains.bad_outputs.size()));
     for (const bool bad : remains.bad_outputs) {
         mcap::put(to, static_cast<std::uint8_t>(bad));
@@ -386,6 +387,7 @@ bool MachineState::get_core(mcap::Fields& from, Core& core) {
          {&remains.safe, &remains.in_budget, &remains.passed, &remains.stopped}) {
         *flag = from.get<std::uint8_t>() != 0;
     }
+    remains.safe_number = from.get<std::uint64_t>();
     for (auto count = from.get<std::uint32_t>(); count > 0 && from.good(); --count) {
         remains.bad_outputs.push_back(from.get<std::uint8_t>() != 0);
     }

@@ -167,7 +167,7 @@ class FrameGuardian(GuardedMachine, Case):
         wait_until(lambda: len(self.bus.frames) >= 12, "the frames of the second stop")
         errors = self.end(machine)[1]
         for line in begun:
-            self.assertIn(line, errors)
+            self.assertEqual(1, errors.count(line), errors)
 
     def test_e_stop_stop_and_unload(self):
         machine = self.run_guarded()
