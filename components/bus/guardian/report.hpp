@@ -5,6 +5,7 @@
 #include <fcntl.h>
 #include <poll.h>
 #include <stdlib.h>
+#include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -13,6 +14,7 @@
 #include <string>
 #include <system_error>
 
+#include "bus/guardian/report_lock.hpp"
 #include "hal/read_file.hpp"
 #include "hal/system_log.hpp"
 #include "link/system.hpp"
@@ -47,12 +49,34 @@ inline std::string report_file(const std::string& link) {
     return (folder / name).string();
 }
 
+/// Marks a report that has no file: the length of its lock needs no space on a full disk.
+inline void mark_lost(const char* report) {
+    const link::Descriptor lock(
+        ::open(lock_file(report).c_str(), O_WRONLY | O_CLOEXEC | O_NOFOLLOW));
+    if (lock && ::ftruncate(lock.get(), 1) == 0) {
+        ::fsync(lock.get());
+    }
+}
+
+/// Returns whether a report is marked as lost, and removes the mark.
+inline bool take_mark(const std::string& report) {
+    const link::Descriptor lock(::open(lock_file(report).c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW));
+    struct stat status{};
+    if (!lock || ::fstat(lock.get(), &status) != 0 || status.st_size == 0) return false;
+    return ::ftruncate(lock.get(), 0) == 0;
+}
+
 /// Returns the content of the file and deletes it. States what is known of a report that is
-/// incomplete: its last character, a line end, is missing.
+/// incomplete, because its last character, a line end, is missing, or that has no file.
 inline std::string take_report(const std::string& file) {
     constexpr std::size_t max_bytes = 65536;  // of a line with 247 slaves: 15000
+    if (file.empty()) return {};
+    const bool is_lost = take_mark(file);
     std::string text;
-    if (file.empty() || !read_regular_file(file, max_bytes, text)) return {};
+    if (!read_regular_file(file, max_bytes, text)) {
+        if (!is_lost) return {};
+        text.clear();  // has the reason
+    }
     ::unlink(file.c_str());
     if (text.empty()) return "the process has ended; the report is lost: " + cut_reason();
     if (text.back() != '\n') return text + " … the rest is lost: " + cut_reason();
@@ -70,12 +94,16 @@ inline bool keep_name(const char* file) {
 }
 
 /// Writes the file to the disk; an empty name: nothing. Returns false when it is incomplete or
-/// missing.
+/// missing, of which the next start reads one or the other.
 inline bool keep_report(const char* file, const std::string& text) {
     if (file[0] == '\0') return true;
     const link::Descriptor fd(
         ::open(file, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0600));
-    if (!fd || !write_whole(fd.get(), text + "\n")) return false;
+    if (!fd) {
+        mark_lost(file);
+        return false;
+    }
+    if (!write_whole(fd.get(), text + "\n")) return false;
     return ::fsync(fd.get()) == 0 && keep_name(file);
 }
 

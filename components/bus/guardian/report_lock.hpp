@@ -13,6 +13,9 @@
 
 namespace hal::bus {
 
+/// Returns the file whose lock a report has.
+inline std::string lock_file(const std::string& report) { return report + ".lock"; }
+
 /// One machine at a time has a report file: `REPORT.lock` beside it is locked for as long as the
 /// machine or its guardian runs. The guardian inherits the descriptor, so that a machine that is
 /// started again at once does not take a report that is not yet written.
@@ -26,7 +29,7 @@ public:
         release();
         if (report.empty()) return {};
         link::Descriptor file(
-            ::open((report + ".lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600));
+            ::open(lock_file(report).c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600));
         const std::int64_t end = link::monotonic_ns() + limit_ns;
         while (file && flock(file.get(), LOCK_EX | LOCK_NB) != 0) {
             if (errno != EWOULDBLOCK && errno != EINTR) return {};

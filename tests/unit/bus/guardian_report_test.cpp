@@ -69,6 +69,20 @@ TEST_F(GuardianReport, states_that_it_is_lost) {
               "full?); the system's log may have it");
 }
 
+TEST_F(GuardianReport, states_that_it_has_no_file) {
+    hal::bus::ReportLock lock;
+    ASSERT_EQ(lock.acquire(file, "sim:line"), "");
+    fs::create_directory(file);  // as without a free inode: it cannot be created
+    EXPECT_FALSE(hal::bus::keep_report(file.c_str(), "the process has ended; 1.0 ms"));
+    fs::remove(file);
+    EXPECT_EQ(hal::bus::take_report(file),
+              "the process has ended; the report is lost: it could not be written whole (disk "
+              "full?); the system's log may have it");
+    EXPECT_EQ(hal::bus::take_report(file), "");
+    EXPECT_TRUE(hal::bus::keep_report(file.c_str(), "the process has ended; 2.0 ms"));
+    EXPECT_EQ(hal::bus::take_report(file), "the process has ended; 2.0 ms");
+}
+
 TEST_F(GuardianReport, that_cannot_be_kept_is_known) {
     EXPECT_FALSE(hal::bus::keep_report((folder / "none/report").c_str(), "text"));
     EXPECT_TRUE(hal::bus::keep_report("", "text")) << "there is no folder for it";
