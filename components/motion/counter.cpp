@@ -52,7 +52,7 @@ struct Counter : hal::Component {
 
     void capture_position(hal::Cycle) noexcept {
         const auto& now = count_.capture(index_enable, reset);
-        const double scale = edge_count::valid_scale(position_scale);
+        const double scale = scale_.get();
         const double speed = count_.speed(now);
         counts = static_cast<std::int32_t>(now.raw - count_.zero());
         position = static_cast<double>(now.raw - count_.zero()) / scale;
@@ -61,6 +61,7 @@ struct Counter : hal::Component {
 
 private:
     edge_count::Count count_;
+    edge_count::Scale scale_{*this, position_scale};
     bool started_ = false;
     bool a_ = false;
     bool z_ = false;  // update-counters
@@ -75,7 +76,8 @@ HAL_COMPONENT(Counter, "counter",
 For a spindle with slots and an index pulse per revolution. `encoder` with `counter-mode` has the
 same functions and more; `counter` is for netlists that already use it. The first sample has no edge
 (LinuxCNC: a `phase-A` that is TRUE from the start counts). Below 0.1 counts per second `velocity`
-is 0.
+is 0. While `position-scale` is NaN or infinite, its last valid value applies, and a fault names it;
+0 is set to 1.
 
     loadrt counter names=spindle
     addf counter.update-counters base

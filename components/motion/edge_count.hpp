@@ -9,6 +9,7 @@
 #include <cstdint>
 
 #include "hal/component.hpp"
+#include "hal/last_valid.hpp"
 #include "hal/queue.hpp"
 
 namespace edge_count {
@@ -123,12 +124,23 @@ private:
     double speed_ = 0.0;
 };
 
-/// Returns the scale, after setting an invalid one (0, NaN, infinite) to 1. [realtime]
-inline double valid_scale(hal::Io<double>& scale) noexcept {
-    if (std::fabs(scale) < 1e-20 || !std::isfinite(scale)) {
-        scale = 1.0;
+/// The counts per unit of position. 0 is set to 1; while the pin is NaN or infinite, its last valid
+/// value applies: another one would move the position.
+class Scale {
+public:
+    Scale(hal::Component& component, hal::Io<double>& pin)
+        : pin_(pin), valid_(component, "position-scale", hal::finite_value, 1.0) {}
+    /// Returns the scale that applies. [realtime]
+    double get() noexcept {
+        if (std::fabs(pin_) < 1e-20) {
+            pin_ = 1.0;
+        }
+        return valid_.follow(pin_);
     }
-    return scale;
-}
+
+private:
+    hal::Io<double>& pin_;
+    hal::LastValid valid_;
+};
 
 }  // namespace edge_count

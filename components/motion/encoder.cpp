@@ -104,7 +104,7 @@ struct Encoder : hal::Component {
     void capture_position(hal::Cycle) noexcept {
         const auto& now = count_.capture(index_enable, reset);
         const std::int64_t zero = count_.zero();
-        const double scale = edge_count::valid_scale(position_scale);
+        const double scale = scale_.get();
         if (min_speed == 0.0) {
             min_speed.correct(1.0);
         }
@@ -159,6 +159,7 @@ private:
     }
 
     edge_count::Count count_;
+    edge_count::Scale scale_{*this, position_scale};
     // update-counters
     bool started_ = false;
     bool a_ = false;
@@ -206,7 +207,10 @@ counts/s. If both phases change at once, edges are lost and `quad-errors` increa
   arrives, the estimate falls to what the next one would give; below `min-speed-estimate` it is 0.
   An edge crossed back gives 0: the position is the same.
 
-Counts are kept in 64 bits, so `position` is continuous when the 32 bits of `counts` wrap.
+Counts are kept in 64 bits, so `position` is continuous when the 32 bits of `counts` wrap. While
+`position-scale` is NaN or infinite, its last valid value applies, and a fault names it; 0 is set to
+1, as in LinuxCNC. A negative scale is the other direction: the counts stay, and `position` turns
+around with the sign.
 
 **Differences from LinuxCNC:** `counts`, `position` and `velocity` are bit-identical except in these
 cases. Counting starts from the state of the phases in the first cycle (LinuxCNC starts from both

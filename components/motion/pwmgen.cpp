@@ -8,6 +8,7 @@
 
 #include "hal/component.hpp"
 #include "hal/function_monitor.hpp"
+#include "hal/last_valid.hpp"
 #include "hal/lasting_fault.hpp"
 #include "hal/limit.hpp"
 #include "hal/queue.hpp"
@@ -108,13 +109,13 @@ struct Pwmgen : hal::Component {
 
 private:
     Order order(double tick_ns) noexcept {
-        if (scale == 0.0 || !std::isfinite(scale)) {
+        if (scale == 0.0) {
             scale = 1.0;
         }
         max_duty = std::clamp(max_duty.get(), 0.0, 1.0);
         min_duty = std::clamp(min_duty.get(), 0.0, max_duty.get());
 
-        const double raw = value / scale + offset;
+        const double raw = value / valid_scale_.follow(scale) + offset;
         if (!enable || !std::isfinite(raw)) {
             return {};
         }
@@ -194,6 +195,7 @@ private:
     }
 
     const hal_faults* faults_ = hal::extension<hal_faults>("hal.faults/1");
+    hal::LastValid valid_scale_{*this, "scale", hal::finite_value, 1.0};  // update
     hal::FunctionMonitor updates_;  // make-pulses monitors update
     hal::LastingFault abandoned_;  // make-pulses only
     const std::string abandoned_text_ =
@@ -245,7 +247,8 @@ may run on different CPUs.
 
 All outputs go low on stop, unload and faults, and when `update`, which reads `enable`, has not run
 for 100 of its periods (a fault names it). A `min-dc` or `max-dc` that is NaN is set to its last
-valid value, and a fault is raised.
+valid value, and a fault is raised. A `scale` that is NaN or infinite remains, and its last valid
+value applies; 0 is set to 1, as in LinuxCNC.
 
 **Differences from LinuxCNC:** the waveforms are the same except in these cases. The first PWM
 period starts with `enable` (LinuxCNC: the outputs stay low for up to a period, and all periods

@@ -11,6 +11,7 @@
 #include "hal/corrected.hpp"
 #include "hal/function_monitor.hpp"
 #include "hal/interruption.hpp"
+#include "hal/last_valid.hpp"
 #include "hal/lasting_fault.hpp"
 #include "hal/limit.hpp"
 #include "hal/queue.hpp"
@@ -233,8 +234,7 @@ struct Stepgen : hal::Component {
         if (std::fabs(position_scale) < 1e-20) {
             position_scale.correct(1.0);
         }
-        scale_.store(std::isfinite(position_scale) ? position_scale.get() : 1.0,
-                     std::memory_order_relaxed);
+        scale_.store(valid_scale_.follow(position_scale), std::memory_order_relaxed);
         const std::int64_t known_ns = tick_ns_.load(std::memory_order_relaxed),
                            tick_ns = known_ns > 0 ? known_ns : cycle.period_ns();
         if (known_ns > 0) {
@@ -441,6 +441,7 @@ private:
     std::atomic<std::int64_t> tick_ns_{0};  // period of make-pulses: it writes, update-freq reads
     std::atomic<std::int64_t> made_out_{0};  // make-pulses writes, capture-position reads
     std::atomic<double> position_out_{0.0};  // make-pulses writes, the other two read
+    hal::LastValid valid_scale_{*this, "position-scale", hal::finite_value, 1.0};  // update-freq
     std::atomic<double> scale_{1.0};  // update-freq writes, capture-position reads
     // make-pulses only
     double position_ = 0.0;  // where the motor should be, in steps
@@ -514,7 +515,9 @@ one period. A negative `maxvel` or `maxaccel` is set to 0; one that is above wha
 permits (for `maxaccel`: from 0 to the highest speed in one update) is set to that. With `stepspace`
 0 a pulse may occur in every period, for ports that reset the pulse themselves. When `update-freq`,
 which reads `enable`, has not run for 100 of its periods, the motor stops, and a fault names the
-missing function. After a stop of the threads the rate begins at 0 and rises within `maxaccel`.
+missing function. While `position-scale` is NaN or infinite, its last valid value applies, and a
+fault names it; 0 is set to 1, as in LinuxCNC. After a stop of the threads the rate begins at 0 and
+rises within `maxaccel`.
 
 **Differences from LinuxCNC:** steps occur in different periods. A command with constant speed is
 followed with a lag of one update (LinuxCNC: two and a half), and braking starts as late as

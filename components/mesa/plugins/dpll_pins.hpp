@@ -9,8 +9,14 @@
 #include "mesa/hostmot2/formulas.hpp"
 #include "mesa/hostmot2/registers.hpp"
 #include "module_pins.hpp"
+#include "valid_pin.hpp"
 
 namespace hal::mesa {
+
+/// Negative is that of the thread. Without bounds the loop would stand, or run at its highest rate.
+inline constexpr ValueRule frequency_value{[](double khz) noexcept {
+    return std::isfinite(khz) && (khz < 0.0 || (khz >= 1e-3 && khz <= 1e3));
+}, " is 0, NaN, infinite, below 0.001 or above 1000; "};
 
 /// Its timers latch positions at a fixed time before the reading. Reading the sync register is the
 /// event that it locks to. `leads`: it runs freely, and the threads follow it.
@@ -28,7 +34,7 @@ public:
           timers_1_2_(module.addresses.at(dpll::timers_1_2)),
           timers_3_4_(module.addresses.at(dpll::timers_3_4)),
           base_freq_khz_(o.component, o.write, "dpll.base-freq-khz",
-                         "frequency; negative: that of the thread",
+                         "frequency; negative: that of the thread", frequency_value,
                          {.initial = -1.0, .unit = "kHz"}),
           time_const_(o.component, o.write, "dpll.time-const", "time constant of the loop filter",
                       {.initial = 2000}),
@@ -40,10 +46,11 @@ public:
           prescale_(o.component, "dpll.prescale", "divider of its clock; it is computed",
                     {.initial = 1}) {
         for (unsigned n = 1; n <= 4; ++n) {
-            timer_us_.push_back(place<hal::In<double>>(
+            timer_us_.push_back(place<ValidIn>(
                 o.component, o.write, pin_name("dpll", n, "timer-us").c_str(),
-                "when the timer latches, after the reading; negative: before it",
-                hal::PinOptions<double>{.initial = 100.0, .unit = "us"}));
+                "when the timer latches, after the reading; negative: before it; at the reading "
+                "where that is not within a period",
+                finite_value, hal::PinOptions<double>{.initial = 100.0, .unit = "us"}));
         }
     }
 
@@ -102,8 +109,8 @@ private:
     Setting base_;
     const std::uint16_t preset_address_;
     Setting control_0_, control_1_, timers_1_2_, timers_3_4_;
-    std::vector<Placed<hal::In<double>>> timer_us_;
-    hal::In<double> base_freq_khz_;
+    std::vector<Placed<ValidIn>> timer_us_;
+    ValidIn base_freq_khz_;
     hal::In<std::uint32_t> time_const_, plimit_;
     hal::Out<double> phase_error_us_;
     hal::Out<std::uint32_t> ddsize_;

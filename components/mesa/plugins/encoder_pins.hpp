@@ -16,6 +16,7 @@
 #include "mesa/hostmot2/registers.hpp"
 #include "module_pins.hpp"
 #include "scale_param.hpp"
+#include "valid_pin.hpp"
 
 namespace hal::mesa {
 
@@ -78,7 +79,7 @@ public:
           filter_(o.component, named(unit, "filter"),
                   "TRUE: a level counts after 15 samples; FALSE: after 3", {.initial = true}),
           vel_timeout_(o.component, named(unit, "vel-timeout"),
-                       "time without a count until the velocity is 0",
+                       "time without a count until the velocity is 0", time_value,
                        {.initial = 0.5, .unit = "s"}) {
         // one at a time: a name lasts until the next one
         hal::Retained(o.component, {{named(unit, "counter"), counter_}});
@@ -271,7 +272,7 @@ private:
     hal::Io<bool> index_enable_;
     ScaleParam scale_;
     hal::Param<bool> index_invert_, index_mask_, index_mask_invert_, counter_mode_, filter_;
-    hal::Param<double> vel_timeout_;
+    ValidParam vel_timeout_;
     Placed<Probe> probe_;  ///< of firmware that has one
 };
 

@@ -6,12 +6,12 @@
 #include <vector>
 
 #include "command_pin.hpp"
-#include "hal/limit.hpp"
 #include "mesa/driver/bridge_enable.hpp"
 #include "mesa/hostmot2/formulas.hpp"
 #include "mesa/hostmot2/registers.hpp"
 #include "module_pins.hpp"
 #include "scale_param.hpp"
+#include "valid_pin.hpp"
 
 namespace hal::mesa {
 
@@ -33,13 +33,13 @@ public:
           scale_(o.component, named(unit, "scale"), "command of a duty cycle of 100 %",
                  {.initial = 1.0}),
           dead_time_(o.component, named(unit, "deadtime"),
-                     "time between the two gates of a phase: none of them is on",
+                     "time between the two gates of a phase: none of them is on", time_value,
                      {.initial = 5000.0, .unit = "ns"}),
           fault_invert_(o.component, named(unit, "fault-invert"),
                         "FALSE: the fault input is active low; TRUE: active high"),
           sample_time_(o.component, named(unit, "sample-time"),
                        "time of the sampling pulse: 0 start of a PWM cycle, 1 its end",
-                       {.initial = 0.5}) {}
+                       finite_value, {.initial = 0.5}) {}
 
     /// [realtime] read
     void receive(std::uint32_t enable, const Reading& reading) noexcept {
@@ -91,9 +91,9 @@ private:
     hal::In<bool> enable_;
     hal::Out<bool> fault_;
     ScaleParam scale_;
-    hal::LimitParam dead_time_;
+    ValidParam dead_time_;
     hal::Param<bool> fault_invert_;
-    hal::Param<double> sample_time_;
+    ValidParam sample_time_;
 };
 
 class ThreePhasePins final : public ModulePins {

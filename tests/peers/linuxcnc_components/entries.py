@@ -1145,7 +1145,7 @@ behaviour(
     "position-scale|position|velocity",
     lambda v: v.invalid() or v.beyond(1e12) or v["position-scale"] == 0,
     "`position-scale` is NaN, infinite or 0",
-    "1",
+    "the last valid value; 1 for 0",
     "is used",
     "a division by 0",
     ("counter num_chan=1", "wild"),
