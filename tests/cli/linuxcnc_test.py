@@ -5,6 +5,7 @@
 
 import os
 import signal
+import socket
 import time
 import unittest
 from pathlib import Path
@@ -413,8 +414,42 @@ CONFIG/machine.ini [TASK]TASK:1:20: error: 'milltask' ended before a component '
             "start it in a terminal of the desktop, or on another computer after: ssh -X\n",
             self.linuxcnc(ini, status=1)[1],
         )
-        self.environment["DISPLAY"] = ":9"
+        self.environment["DISPLAY"] = ":4711.0"
+        self.assertEqual(
+            "hal linuxcnc: CONFIG/machine.ini: [DISPLAY]DISPLAY is 'axis', which opens windows, and no screen answers at the environment's DISPLAY ':4711.0'; "
+            "start it in a terminal of the desktop, or on another computer after: ssh -X\n",
+            self.linuxcnc(ini, status=1)[1],
+        )
+        with socket.socket(socket.AF_UNIX) as screen:
+            screen.bind("\0/tmp/.X11-unix/X4711")
+            screen.listen()
+            self.linuxcnc(ini)
+        self.environment["DISPLAY"] = "localhost:10.0"  # of ssh -X: the program finds out
         self.linuxcnc(ini)
+
+    def test_all_errors_of_an_ini_file_are_reported_at_once(self):
+        ini = self.ini(
+            "[HAL]\nHALFILE = machine.hal\nHALFILE = none.hal\nHALFILE = LIB:none.tcl\n"
+            "[APPLICATIONS]\nDELAY = soon\nAPP = nothing\nAPP = ./ui\nAPP = ./none\n",
+            INI.replace("1.1", "1.0").replace("./ui", "axsi").replace("60s", "often"),
+        )
+        self.assertEqual(
+            [
+                "[EMC]VERSION is 1.0, not 1.1: the file is from an older LinuxCNC; type: update_ini CONFIG/machine.ini",
+                "[APPLICATIONS]DELAY is soon, not a time of 0..3600 seconds",
+                "[HALCYON]MAX_CPU_GAP is 'often', not a time; write 500ms, 2s or 0",
+                "[DISPLAY]DISPLAY is 'axsi', which cannot be started: it is not in PATH",
+                "[APPLICATIONS]APP is 'nothing', which cannot be started: it is not in PATH",
+                "[APPLICATIONS]APP is './none', which cannot be started: No such file or directory",
+                "[HAL]HALFILE is 'none.hal', which cannot be read: No such file or directory",
+                "[HAL]HALFILE is 'LIB:none.tcl', which cannot be read: it is not in HALLIB_DIR and not in /usr/share/linuxcnc/hallib",
+            ],
+            [
+                line.removeprefix("hal linuxcnc: CONFIG/machine.ini: ")
+                for line in self.linuxcnc(ini, status=1)[1].splitlines()
+            ],
+        )
+        self.assertFalse(self.log.exists(), "nothing was started")
 
     def test_bad_ini_files(self):
         version = "hal linuxcnc: CONFIG/machine.ini: [EMC]VERSION is {}, not 1.1: the file is from an older LinuxCNC; type: update_ini CONFIG/machine.ini\n"

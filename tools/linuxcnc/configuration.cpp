@@ -14,6 +14,7 @@
 #include "commands/ini_version.hpp"
 #include "linuxcnc/find/programs.hpp"
 #include "linuxcnc/leftovers.hpp"
+#include "linuxcnc/screen.hpp"
 #include "text/characters.hpp"
 #include "text/diagnostic.hpp"
 #include "text/numbers.hpp"
@@ -90,8 +91,9 @@ class Reader {
 public:
     Reader(const LinuxcncOptions& options, Configuration& to) : options_(options), to_(to) {}
 
+    /// Reports all problems.
     bool read() {
-        if (!version()) return false;
+        version();
         to_.task = program("TASK", "TASK", "milltask");
         const bool newer = to_.linuxcnc.version == LinuxcncVersion::v2_10;
         to_.io = newer ? Words{} : program("EMCIO", "EMCIO", "io");
@@ -108,106 +110,103 @@ public:
         for (const std::string& line : to_.ini.all("APPLICATIONS", "APP")) {
             to_.applications.push_back(application(words_of(line)));
         }
-        if (to_.display.empty()) {
-            complain(
-                "[DISPLAY]DISPLAY is missing: the machine runs as long as its display does; "
-                "write DISPLAY = axis, linuxcncrsh, "
-                "./my-ui.py or dummy");
-
-            return false;
-        }
-        return delay() && watchdogs() && programs();
+        delay();
+        watchdogs();
+        programs();
+        return valid_;
     }
 
 private:
-    bool version() {
+    void version() {
         const std::string problem = ini_version_problem(to_.ini);
         if (!problem.empty()) {
             complain(fmt::format("{}; type: update_ini {}", problem, to_.given));
         }
-        return problem.empty();
     }
 
-    bool delay() {
+    void delay() {
         const std::string text = value("APPLICATIONS", "DELAY", "0");
         const auto seconds = parse_real(text);
         if (!seconds || !(*seconds >= 0 && *seconds <= 3600)) {
             complain(fmt::format("[APPLICATIONS]DELAY is {}, not a time of 0..3600 seconds", text));
-
-            return false;
+            return;
         }
         to_.applications_delay_ns = static_cast<std::int64_t>(*seconds * 1e9);
-        return true;
     }
 
     /// Keys of our own: what is not tolerated of task and of the CPU.
-    bool watchdogs() {
+    void watchdogs() {
         constexpr std::int64_t usual_task_timeout_ns = 5'000'000'000;
         // of threads without a real-time priority, which others may delay at any time
         constexpr std::int64_t usual_gap_ns = 2'000'000'000;
         const bool declared = to_.ini.get("HALCYON", "MAX_CPU_GAP").has_value();
         to_.max_gap_ns = usual_gap_ns;
         to_.task_timeout_ns = usual_task_timeout_ns;
-        if (!limit("MAX_CPU_GAP", to_.max_gap_ns) || !limit("TASK_TIMEOUT", to_.task_timeout_ns)) {
-            return false;
-        }
+        limit("MAX_CPU_GAP", to_.max_gap_ns);
+        limit("TASK_TIMEOUT", to_.task_timeout_ns);
         if (declared) {
             to_.max_gap_realtime_ns = to_.max_gap_ns;
         }
-        return true;
     }
 
-    bool limit(const char* key, std::int64_t& ns) {
+    void limit(const char* key, std::int64_t& ns) {
         const auto text = to_.ini.get("HALCYON", key);
-        if (!text) return true;
+        if (!text) return;
         const auto given = parse_duration_ns(*text);
         if (!given) {
             complain(
                 fmt::format("[HALCYON]{} is '{}', not a time; write 500ms, 2s or 0", key, *text));
         }
         ns = given.value_or(0);
-        return given.has_value();
     }
 
-    /// The programs of LinuxCNC, and the display.
-    bool programs() {
+    /// The programs of LinuxCNC, and those that the INI file names.
+    void programs() {
         for (const std::string& name :
              {std::string("linuxcncsvr"), to_.io.empty() ? "" : to_.io[0], to_.task[0]}) {
             if (!name.empty() && find_part(name).empty()) {
-                fail(options_, to_.linuxcnc.libraries.empty()
-                                   ? fmt::format("'{}' is not installed; type: sudo apt-get "
-                                                 "install linuxcnc-uspace",
-                                                 name)
-                                   : fmt::format("'{}' is missing in the source tree {}, "
-                                                 "which LINUXCNC_HOME names; build it there",
-                                                 name, to_.linuxcnc.home));
-
-                return false;
+                report_missing_part(name);
+                break;  // the others are in the same package
             }
         }
-        if (!to_.halui.empty() && find_program(to_, to_.halui[0]).empty()) {
-            return missing("[HAL]HALUI", to_.halui[0]);
-        }
-        if (!to_.bridge.empty() && find_program(to_, to_.bridge[0]).empty()) {
-            return missing("[HAL]HALBRIDGE", to_.bridge[0]);
-        }
-        if (to_.display[0] != "dummy" && find_program(to_, to_.display[0]).empty()) {
-            return missing("[DISPLAY]DISPLAY", to_.display[0]);
-        }
-        if (opens_windows(to_.display[0]) && !has_screen()) {
-            complain(fmt::format(
-                "[DISPLAY]DISPLAY is '{}', which opens windows, and the environment has no "
-                "DISPLAY; "
-                "start it in a terminal of the desktop, or on another computer after: ssh -X",
-                to_.display[0]));
-            return false;
-        }
+        require("[HAL]HALUI", to_.halui);
+        require("[HAL]HALBRIDGE", to_.bridge);
+        display();
         for (const Words& application : to_.applications) {
-            if (!application.empty() && find_program(to_, application[0]).empty()) {
-                return missing("[APPLICATIONS]APP", application[0]);
-            }
+            require("[APPLICATIONS]APP", application);
         }
-        return true;
+    }
+
+    void report_missing_part(const std::string& name) {
+        valid_ = false;
+        if (to_.linuxcnc.libraries.empty()) {
+            fail(options_, fmt::format("'{}' is not installed; type: sudo apt-get install "
+                                       "linuxcnc-uspace",
+                                       name));
+            return;
+        }
+        fail(options_, fmt::format("'{}' is missing in the source tree {}, which LINUXCNC_HOME "
+                                   "names; build it there",
+                                   name, to_.linuxcnc.home));
+    }
+
+    void display() {
+        if (to_.display.empty()) {
+            complain(
+                "[DISPLAY]DISPLAY is missing: the machine runs as long as its display does; "
+                "write DISPLAY = axis, linuxcncrsh, ./my-ui.py or dummy");
+            return;
+        }
+        if (to_.display[0] != "dummy") {
+            require("[DISPLAY]DISPLAY", to_.display);
+        }
+        if (!opens_windows(to_.display[0])) return;
+        if (const std::string problem = screen_problem(); !problem.empty()) {
+            complain(
+                fmt::format("[DISPLAY]DISPLAY is '{}', which opens windows, and {}; start it in a "
+                            "terminal of the desktop, or on another computer after: ssh -X",
+                            to_.display[0], problem));
+        }
     }
 
     /// A source tree has its own programs: those of a LinuxCNC that is installed as well, which
@@ -229,15 +228,14 @@ private:
                                                    "qtvcp", "touchy",   "tklinuxcnc"};
         return std::ranges::find(all, program) != std::end(all);
     }
-    static bool has_screen() {
-        const auto is_set = [](const char* name) {
-            const char* const text = std::getenv(name);
-            return text != nullptr && *text != '\0';
-        };
-        return is_set("DISPLAY") || is_set("WAYLAND_DISPLAY");
+
+    void require(const char* key, const Words& program) {
+        if (!program.empty() && find_program(to_, program[0]).empty()) {
+            report_missing(key, program[0]);
+        }
     }
 
-    bool missing(const char* key, const std::string& program) {
+    void report_missing(const char* key, const std::string& program) {
         const std::string beside = resolve_path(program, to_.folder);
         std::string why = "it is not in PATH";
         if (fs::exists(beside) && program.find('/') == program.npos) {
@@ -249,7 +247,6 @@ private:
             why = "No such file or directory";
         }
         complain(fmt::format("{} is '{}', which cannot be started: {}", key, program, why));
-        return false;
     }
 
     Words program(const char* section, const char* key, const char* otherwise) {
@@ -276,12 +273,32 @@ private:
         return found && !found->empty() ? *found : otherwise;
     }
     void complain(const std::string& sentence) {
+        valid_ = false;
         fail(options_, fmt::format("{}: {}", to_.given, sentence));
     }
 
     const LinuxcncOptions& options_;
     Configuration& to_;
+    bool valid_ = true;
 };
+
+/// Reports the netlists of [HAL]HALFILE that cannot be read, where the INI file has other errors,
+/// so that nothing runs that would find them.
+void report_unreadable_netlists(const Configuration& configuration,
+                                const LinuxcncOptions& options) {
+    export_configuration(configuration, options);  // where LIB:FILE is
+    for (const std::string& entry : configuration.ini.all("HAL", "HALFILE")) {
+        const Words words = words_of(entry);
+        std::string path;
+        std::string text;
+        std::string problem;
+        if (words.empty() || read_netlist(words[0], configuration.folder, path, text, problem)) {
+            continue;
+        }
+        fail(options, fmt::format("{}: [HAL]HALFILE is '{}', which cannot be read: {}",
+                                  configuration.given, words[0], problem));
+    }
+}
 
 void set_variable(const char* name, const std::string& value, bool replace = true) {
     ::setenv(name, value.c_str(), replace ? 1 : 0);
@@ -349,10 +366,12 @@ std::optional<Configuration> read_configuration(const LinuxcncOptions& options) 
     Diagnostics diagnostics;
     configuration.ini = Ini::read(sources, configuration.given, diagnostics);
     write_all(STDERR_FILENO, render(diagnostics, sources, colours(STDERR_FILENO)));
-    if (diagnostics.failed() || !Reader(options, configuration).read() ||
-        !expand(configuration, options)) {
+    if (diagnostics.failed()) return std::nullopt;
+    if (!Reader(options, configuration).read()) {
+        report_unreadable_netlists(configuration, options);
         return std::nullopt;
     }
+    if (!expand(configuration, options)) return std::nullopt;
     return configuration;
 }
 
