@@ -90,6 +90,16 @@ std::string arrow_help(std::string_view text) {
 
 std::string nothing_yet(std::string_view kind) { return "no " + std::string(kind) + "s exist yet"; }
 
+/// What to type where an output and an I/O pin meet.
+std::string io_help(hal_type type, const std::string& command) {
+    std::string help =
+        "I/O pins can share a signal only with other I/O pins and inputs; " + command;
+    if (type == HAL_TYPE_FLOAT) {
+        help += "; or copy the output in each cycle: loadrt lincurve, whose out-io is an I/O pin";
+    }
+    return help;
+}
+
 }  // namespace
 
 std::string conversion(hal_type from, hal_type to) {
@@ -295,7 +305,6 @@ bool LinkEdit::check_writers(const Pin& pin, const Signal& signal, Word word) {
     const auto first = [&](hal_dir dir) {
         return (*std::ranges::find(signal.pins, dir, &Pin::dir))->linked_at;
     };
-    const char* const io_help = "I/O pins can share a signal only with other I/O pins and inputs";
     const bool is_output = pin.dir == HAL_DIR_OUT;
     if (is_output && signal.writer) {
         return fail("two-writers", word.span, of_signal + " already has a writer", "second output",
@@ -303,14 +312,18 @@ bool LinkEdit::check_writers(const Pin& pin, const Signal& signal, Word word) {
                     "a signal has one output pin; join two sources with sum2, or2 or mux2");
     }
     if (is_output && signal.ios != 0) {
-        return fail("two-writers", word.span,
-                    of_signal + " already has I/O pins, so it cannot have an output", "output",
-                    Other{first(HAL_DIR_IO), "I/O pin"}, io_help);
+        return fail(
+            "two-writers", word.span,
+            of_signal + " already has I/O pins, so it cannot have an output", "output",
+            Other{first(HAL_DIR_IO), "I/O pin"},
+            io_help(pin.type, "set its I/O pins by a command: sets " + signal.name + " VALUE"));
     }
     if (pin.dir == HAL_DIR_IO && signal.writer) {
         return fail("two-writers", word.span,
                     of_signal + " already has a writer, so it cannot have an I/O pin", "I/O pin",
-                    Other{signal.writer->linked_at, "output"}, io_help);
+                    Other{signal.writer->linked_at, "output"},
+                    io_help(pin.type, "leave the pin unlinked and set it: setp " +
+                                          std::string(word.text) + " VALUE"));
     }
     if (pin.type == HAL_TYPE_PORT && pin.dir == HAL_DIR_IN && signal.readers != 0) {
         return fail("two-readers", word.span, "port " + of_signal + " already has a reader",
