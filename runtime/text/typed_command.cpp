@@ -19,11 +19,14 @@ bool is_command(std::string_view text, std::size_t at, std::string_view program)
 
 }  // namespace
 
+std::string started_as() {
+    const char* const started = std::getenv("HALCYON_STARTED_AS");
+    return started == nullptr || *started == '\0' ? "hal" : started;
+}
+
 std::string as_typed(std::string_view text) {
     constexpr std::string_view program = "hal ";
-    const char* const started = std::getenv("HALCYON_STARTED_AS");
-    if (started == nullptr || *started == '\0') return std::string(text);
-    const std::string typed = std::string(started) + " ";
+    const std::string typed = started_as() + " ";
     std::string changed;
     std::size_t from = 0;
     for (std::size_t at = text.find(program); at != std::string_view::npos;

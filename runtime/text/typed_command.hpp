@@ -11,4 +11,7 @@ namespace hal {
 /// where HALCYON_STARTED_AS, which the script `hal` of a clone sets, is "./hal". [setup]
 std::string as_typed(std::string_view text);
 
+/// Returns how the user started this program: "hal", or what HALCYON_STARTED_AS is. [setup]
+std::string started_as();
+
 }  // namespace hal

@@ -169,6 +169,17 @@ class Panel(Case):
         self.assertEqual(1008, program.closed[0])
         self.assertEqual("welcome", self.page(self.token, origin=None).read()["event"])
 
+    def test_the_page_learns_how_commands_are_typed(self):
+        for started, typed in ((None, "hal"), ("./hal", "./hal")):
+            self.environment.pop("HALCYON_STARTED_AS", None)
+            if started:
+                self.environment["HALCYON_STARTED_AS"] = started
+            self.begin(machine=False)
+            self.assertEqual(typed, self.page().read()["hal"])
+        page = self.page()
+        reply = self.ask(page, run="loadrt sum2")
+        self.assertRegex(reply["error"], r"type: \./hal shell$")
+
     def test_listening_on_an_address_needs_the_token(self):
         self.begin("--listen", "127.0.0.2", machine=False)
         self.assertIsNotNone(self.token)

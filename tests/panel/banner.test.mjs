@@ -10,6 +10,7 @@ const good = {
     responding: true,
     running: true,
     instance: 'mill',
+    hal: 'hal',
     past: null,
 };
 
@@ -30,5 +31,16 @@ test('A_machine_that_is_down_is_named', () => {
 });
 
 test('A_stopped_machine_says_how_to_start_it', () => {
-    assert.match(pauseOf({...good, running: false}), /hal shell start$/);
+    const stopped = {...good, running: false};
+    assert.match(pauseOf(stopped), /type: hal shell --name mill start$/);
+    assert.match(pauseOf({...stopped, instance: 'default'}), /type: hal shell start$/);
+});
+
+test('Commands_are_named_as_hal_panel_was_started', () => {
+    const clone = {...good, hal: './hal', instance: 'default'};
+    assert.match(pauseOf({...clone, running: false}), /type: [.][/]hal shell start$/);
+    assert.match(problemOf({...clone, machine: false}), /type: [.][/]hal run FILE[.]hal$/);
+    assert.match(
+        problemOf({...clone, machine: false, instance: 'mill'}),
+        /type: [.][/]hal run --name mill FILE[.]hal$/);
 });

@@ -9,6 +9,7 @@
 #include "panel/requests.hpp"
 #include "panel/server.hpp"
 #include "panel/user_panel.hpp"
+#include "text/typed_command.hpp"
 
 namespace hal::tools {
 
@@ -161,6 +162,7 @@ void PanelClient::greet(const Json& hello) {
     welcome_ = true;
     Json answer{{"event", "welcome"},
                 {"instance", server_.instance()},
+                {"hal", started_as()},
                 {"write", server_.access().write},
                 {"token", by_token_},
                 {"client", number_},

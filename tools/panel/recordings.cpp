@@ -7,6 +7,8 @@
 #include <fmt/core.h>
 #include <nlohmann/json.hpp>
 
+#include "text/typed_command.hpp"
+
 namespace hal::tools {
 
 namespace {
@@ -117,7 +119,7 @@ std::string text_of(const Json& json) {
 std::string why_empty(const mcap::Recording& recording) {
     if (!recording.unread.empty()) return recording.unread;
     if (!recording.missing.empty()) return "all were cut off or damaged; choose another file";
-    return "nothing was recorded; record values with: hal record FILE NAMES";
+    return as_typed("nothing was recorded; record values with: hal record FILE NAMES");
 }
 
 }  // namespace

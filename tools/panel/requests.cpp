@@ -5,6 +5,8 @@
 #include <nlohmann/json.hpp>
 #include <string_view>
 
+#include "text/typed_command.hpp"
+
 namespace hal::tools {
 
 namespace {
@@ -85,7 +87,7 @@ RequestKind check_request(Json& request, std::string& problem) {
     if (verb->name == "run") {
         kind = check_command(request["run"]);
         if (kind == RequestKind::rejected) {
-            problem = "this command is not available in the panel; use: hal shell";
+            problem = as_typed("this command is not available in the panel; type: hal shell");
         }
     }
     for (const char* const period : {"every_ms", "batch_ms"}) {

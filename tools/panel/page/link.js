@@ -21,6 +21,7 @@ export const state = {
     running_ns: 0,  // machine time of the last change of `running`, 0: unknown
     faults: 0,      // not acknowledged
     instance: '',
+    hal: 'hal',  // how the user started hal panel: './hal' in a clone
     version: '',
     pid: 0,
     write: false,
@@ -232,6 +233,7 @@ function receive(text) {
             Object.assign(state, {
                 server: 'up',
                 instance: message.instance,
+                hal: message.hal,
                 write: message.write,
                 token: message.token,
                 panel: message.panel ?? null,

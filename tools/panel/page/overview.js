@@ -125,7 +125,7 @@ class ThreadCard {
         text(
             this.policy,
             `${policy}${cpu >= 0 ? `, CPU ${cpu}` : ''}${
-                unprivileged ? '. To grant real-time priority, see: hal doctor' : ''}`);
+                unprivileged ? `. To grant real-time priority, type: ${state.hal} doctor` : ''}`);
         this.policy.className = unprivileged ? 'warn' : 'dim';
     }
 }

@@ -91,7 +91,8 @@ function build(node, pins, path) {
 /// What keeps this page from operating the panel; empty: nothing does.
 function obstacle() {
     if (state.held) return '';
-    if (!state.write) return 'Read-only: restart hal panel with --write to operate this panel.';
+    if (!state.write)
+        return `Read-only: to operate this panel, type: ${state.hal} panel --write FILE.panel`;
     if (state.token) return 'Take control to operate this panel.';
     return 'Read-only: open the address with the token.';
 }
@@ -104,7 +105,8 @@ export class View {
         this.subscriptions = [];
         this.stop = () => {};
         if (!panel) {
-            main.append(h('p', {}, 'No user panel is loaded. Start with: hal panel FILE.panel'));
+            const load = `${state.hal} panel FILE.panel`;
+            main.append(h('p', {}, `No user panel is loaded. To load one, type: ${load}`));
             return;
         }
         this.pins = new Pins(panel.pins, values => {
