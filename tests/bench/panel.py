@@ -89,13 +89,15 @@ def start_other(case):
 
 
 def first_picture(browser, ports):
-    browser.call("Page.addScriptToEvaluateOnNewDocument", source=FIRST_PICTURE)
+    script = browser.call("Page.addScriptToEvaluateOnNewDocument", source=FIRST_PICTURE)
     times = {port: [] for port in ports}
     for port in ports * 7:
         browser.open("about:blank")
         browser.wait("location.href === 'about:blank'")
         browser.open(f"http://localhost:{port}/#/overview")
         times[port].append(browser.wait("window.firstPicture"))
+    # On another view it would look for its picture in every frame.
+    browser.call("Page.removeScriptToEvaluateOnNewDocument", **script)
     for port, build in zip(ports, ("", ", other build")):
         median = statistics.median(times[port])
         row(f"page to first picture, median of 7{build}", "ms", median, "<= 300")

@@ -73,19 +73,25 @@ const frame = 17;  // ms at most from requestAnimationFrame() to the frame
 /// `opaque`: draw() paints every pixel.
 export function surface(canvas, draw, opaque = false) {
     let asked = false, timer = 0, painted = -Infinity;
+    let width = 0, height = 0;  // CSS pixels
+    const context = canvas.getContext('2d', {alpha: !opaque});
+    // The size of an element makes the browser lay out the page: it is not read in every picture.
+    const measure = () => {
+        width = canvas.clientWidth;
+        height = canvas.clientHeight;
+    };
     const paint = () => {
         asked = false;
         painted = performance.now();
         if (!canvas.isConnected) return;
-        const ratio = devicePixelRatio || 1, width = canvas.clientWidth,
-              height = canvas.clientHeight;
+        if (width === 0 || height === 0) measure();
         if (width === 0 || height === 0) return;
+        const ratio = devicePixelRatio || 1;
         if (canvas.width !== Math.round(width * ratio) ||
             canvas.height !== Math.round(height * ratio)) {
             canvas.width = Math.round(width * ratio);
             canvas.height = Math.round(height * ratio);
         }
-        const context = canvas.getContext('2d', {alpha: !opaque});
         context.setTransform(ratio, 0, 0, ratio, 0, 0);
         if (!opaque) context.clearRect(0, 0, width, height);
         draw(context, width, height, ratio);
@@ -97,16 +103,20 @@ export function surface(canvas, draw, opaque = false) {
     const follow = () => {
         if (asked || timer !== 0) return;
         const wait = painted + pictureInterval - frame - performance.now();
+        if (wait <= 0) return request();
         timer = setTimeout(() => {
             timer = 0;
             request();
-        }, Math.max(wait, 0));
+        }, wait);
     };
     const end = () => {
         clearTimeout(timer);
         watch.disconnect();
     };
-    const watch = new ResizeObserver(request);
+    const watch = new ResizeObserver(() => {
+        measure();
+        request();
+    });
     watch.observe(canvas);
     canvas.addEventListener('redraw', request);
     request();

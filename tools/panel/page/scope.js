@@ -134,6 +134,7 @@ export class View {
         this.picture = new Picture();
         this.labels = new Labels();
         this.looks = {dark: null, back: '', grid: '', text: '', dim: '', bad: ''};
+        this.measurements = 0;
         this.frames = 0;  // since the last measurement
         this.drawn = 0;
         this.since = performance.now();
@@ -593,7 +594,7 @@ export class View {
         if (this.recording !== '') return this.showRecording(list, call);
         if (state.past) return this.showMoment(list);
         let known = 0;
-        const options = {batch_ms: pictureInterval - 5};
+        const options = {batch_ms: pictureInterval};
         this.stopFollowing = probe(list, options, (event, bytes, layout) => {
             if (layout.layout !== known) {
                 known = layout.layout;
@@ -827,12 +828,8 @@ export class View {
                 dim: colour('--dim'),
                 bad: colour('--bad')
             };
-        picture.begin(width, height, thick, this.looks.back);
-        this.drawStops();
-        for (let i = 1; i < divisions; i++)
-            picture.vertical(width * i / divisions, this.looks.grid);
-        for (let i = 1; i < rows; i++)
-            picture.horizontal(height / rows * i, this.looks.grid);
+        picture.begin(
+            width, height, thick, this.looks.back, this.stopsKey(), () => this.drawGround());
         channels.forEach((channel, i) => {
             this.chooseScale(channel);
             this.drawZero(channel, i, thick, ratio);
@@ -871,6 +868,22 @@ export class View {
         context.fillStyle = back;
         context.fillRect(x - 12, y - 22, wide + 24, 36);
         write(context, {text: notice, x, y: y + 2, paint: bad, font}, back, width);
+    }
+
+    /// What the ground of the picture depends on besides its size and colours.
+    stopsKey() {
+        if (this.stops.length === 0) return '';
+        return [...this.range(), ...this.stops.flatMap(({from, to}) => [from, to])].join(' ');
+    }
+
+    /// What is behind the traces: the shaded times and the grid.
+    drawGround() {
+        const {picture} = this, {width, height} = this.canvas;
+        this.drawStops();
+        for (let i = 1; i < divisions; i++)
+            picture.vertical(width * i / divisions, this.looks.grid);
+        for (let i = 1; i < rows; i++)
+            picture.horizontal(height / rows * i, this.looks.grid);
     }
 
     /// Shades the time in which the functions did not run.
@@ -1026,7 +1039,10 @@ export class View {
     }
 
     measureAll() {
-        this.channels.forEach(channel => this.measureChannel(channel));
+        // Each text that changes makes the browser lay out the table: once a second is enough.
+        this.measurements++;
+        if (!this.run || this.measurements % 2 === 1)
+            this.channels.forEach(channel => this.measureChannel(channel));
         if (this.notice() !== '') this.surface.request();
         this.drawHistory();
         const now = performance.now(), fps = this.frames * 1000 / (now - this.since);

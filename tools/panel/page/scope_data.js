@@ -268,6 +268,26 @@ function measureCoarse(store, name, from, to) {
     return {min, max, mean: null, rms: null, deviation: null, frequency: null, count: 0};
 }
 
+/// The times at which values from `min` to `max` rise through their middle, interpolated between
+/// two samples.
+function risingEdges(group, values, begin, end, min, max) {
+    const middle = (min + max) / 2, armedBelow = middle - (max - min) * .1, mask = capacity - 1;
+    const edges = [];
+    let armed = false;
+    for (let row = begin + 1; row < end && max > min; row++) {
+        const value = values[row & mask];
+        if (value < armedBelow)
+            armed = true;
+        else if (armed && value >= middle) {
+            armed = false;
+            const before = values[(row - 1) & mask], first = group.time(row - 1);
+            const share = value === before ? 0 : (middle - before) / (value - before);
+            edges.push(first + (group.time(row) - first) * Math.min(1, Math.max(0, share)));
+        }
+    }
+    return edges;
+}
+
 /// Minimum, maximum, mean, rms, standard deviation and frequency between two times; null without
 /// samples. The frequency needs two rising crossings of the middle. Of a time whose rows are
 /// overwritten only minimum and maximum are known, the others are null.
@@ -276,34 +296,19 @@ export function measure(store, name, from, to) {
     if (!place) return null;
     if (store.isCoarse(name, from)) return measureCoarse(store, name, from, to);
     const [group, column] = place, begin = group.row(from), end = group.row(to);
+    const values = group.values[column], mask = capacity - 1;  // the hot loops: no calls
     let min = Infinity, max = -Infinity, mean = 0, squares = 0, deviations = 0, count = 0;
     for (let row = begin; row < end; row++) {
-        const value = group.value(column, row);
+        const value = values[row & mask], off = value - mean;
         if (!Number.isFinite(value)) continue;
-        min = Math.min(min, value);
-        max = Math.max(max, value);
+        if (value < min) min = value;
+        if (value > max) max = value;
         squares += value * value;
-        const off = value - mean;  // Welford: exact beside a large mean
-        mean += off / ++count;
+        mean += off / ++count;  // Welford: exact beside a large mean
         deviations += off * (value - mean);
     }
     if (count === 0) return null;
-    const middle = (min + max) / 2, gap = (max - min) * .1, edges = [];
-    let armed = false;
-    for (let row = begin + 1; row < end && max > min; row++) {
-        const value = group.value(column, row), before = group.value(column, row - 1);
-        if (value < middle - gap)
-            armed = true;
-        else if (armed && value >= middle) {
-            armed = false;
-            edges.push(
-                group.time(row - 1) +
-                (group.time(row) - group.time(row - 1)) *
-                    (value === before ?
-                         0 :
-                         Math.min(1, Math.max(0, (middle - before) / (value - before)))));
-        }
-    }
+    const edges = risingEdges(group, values, begin, end, min, max);
     const frequency =
         edges.length > 1 ? (edges.length - 1) / (edges[edges.length - 1] - edges[0]) : null;
     const rms = Math.sqrt(squares / count), deviation = Math.sqrt(deviations / count);

@@ -17,16 +17,27 @@ export class Picture {
         this.colours = new Map();
         this.width = this.height = this.thick = 0;
     }
-    /// Begins a picture of that many pixels. `thick`: pixels of a line.
-    begin(width, height, thick, back) {
+    /// Begins a picture of that many pixels. `thick`: pixels of a line. `key`: what drawGround()
+    /// depends on besides, which draws what is behind the traces and is the same in most pictures.
+    begin(width, height, thick, back, key, drawGround) {
         if (!this.image || this.image.width !== width || this.image.height !== height) {
             this.image = new ImageData(width, height);
             this.pixels = new Uint32Array(this.image.data.buffer);
+            this.ground = new Uint32Array(width * height);
+            this.groundKey = '';
         }
         this.width = width;
         this.height = height;
         this.thick = thick;
+        const wholeKey = `${thick} ${back} ${key}`;
+        if (this.groundKey === wholeKey) {
+            this.pixels.set(this.ground);
+            return;
+        }
         this.pixels.fill(this.colour(back));
+        drawGround();
+        this.ground.set(this.pixels);
+        this.groundKey = wholeKey;
     }
     colour(name) {
         if (!this.colours.has(name)) this.colours.set(name, pixel(name));
@@ -88,14 +99,15 @@ export class Picture {
             return;
         }
         const columns = store.columns(channel, each), first = Math.floor(from / each),
-              {width, height, pixels} = this, {dashed, thick} = line;
+              {width, height, pixels} = this, {dashed, thick} = line,
+              {index, low, high, mask, newest} = columns;
         let top = NaN, bottom = NaN;
         for (let x = 0; x < width; x++) {  // the hot loop: no calls
-            const interval = first + x, at = interval & columns.mask;
-            if (columns.index[at] === interval) {
-                top = Math.round(zero - columns.high[at] * perUnit);
-                bottom = Math.round(zero - columns.low[at] * perUnit);
-            } else if (interval > columns.newest || top !== top)
+            const interval = first + x, at = interval & mask;
+            if (index[at] === interval) {
+                top = Math.round(zero - high[at] * perUnit);
+                bottom = Math.round(zero - low[at] * perUnit);
+            } else if (interval > newest || top !== top)
                 continue;
             else
                 top = bottom;  // no sample in this column: the last value holds
