@@ -169,6 +169,21 @@ class Panel(Case):
         self.assertEqual(1008, program.closed[0])
         self.assertEqual("welcome", self.page(self.token, origin=None).read()["event"])
 
+    def test_several_machines_are_listed_to_choose_from(self):
+        netlist = self.write("m.hal", SERVO)
+        for name in ("left", "right"):
+            self.start("run", "--name", name, netlist, loaded=False)
+            wait_until(
+                lambda: self.run_program("shell", "--name", name, "show", "thread").returncode == 0,
+                "the machine runs",
+            )
+        self.begin(machine=False)
+        self.assertEqual(
+            "hal panel: no instance 'default' is running yet; the page shows it as soon as it runs\n"
+            "hal panel: running: left, right; to show one of them, type: hal panel --name left\n",
+            (self.folder / "panel.err").read_text(),
+        )
+
     def test_the_page_learns_how_commands_are_typed(self):
         for started, typed in ((None, "hal"), ("./hal", "./hal")):
             self.environment.pop("HALCYON_STARTED_AS", None)

@@ -3,7 +3,7 @@
 #include <arpa/inet.h>
 #include <array>
 #include <filesystem>
-#include <fmt/core.h>
+#include <fmt/format.h>
 #include <thread>
 #include <unistd.h>
 
@@ -15,6 +15,7 @@
 #include "panel/recordings.hpp"
 #include "panel/server.hpp"
 #include "text/characters.hpp"
+#include "text/typed_command.hpp"
 
 namespace hal::tools {
 
@@ -103,6 +104,20 @@ std::string announcement(const PanelOptions& options, const Access& access,
     return text;
 }
 
+/// What is said of an instance that does not run, with the others to choose from.
+std::string not_running(const std::string& instance) {
+    std::string text = fmt::format(
+        "hal panel: no instance '{}' is running yet; the page shows it as soon as it runs\n",
+        instance);
+    const std::vector<std::string> running = running_instances();
+    if (!running.empty()) {
+        text +=
+            fmt::format("hal panel: running: {}; to show one of them, type: {} panel --name {}\n",
+                        fmt::join(running, ", "), started_as(), running.front());
+    }
+    return text;
+}
+
 }  // namespace
 
 int run_panel(const PanelOptions& options) {
@@ -147,9 +162,7 @@ int run_panel(const PanelOptions& options) {
         server.load(std::move(layout));
     }
     if (!std::filesystem::exists(found_socket(instance))) {
-        write_all(STDERR_FILENO, fmt::format("hal panel: no instance '{}' is running yet; the page "
-                                             "shows it as soon as it runs\n",
-                                             instance));
+        write_all(STDERR_FILENO, not_running(instance));
     }
     if (!print(announcement(options, access, instance, server.port(), names))) return 1;
     std::thread ending([&] {
