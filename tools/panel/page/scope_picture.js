@@ -91,7 +91,7 @@ export class Picture {
                         if (x % 12 < 8) this.fill(x, 1, here, here + line.thick - 1, paint);
                 } else
                     this.fill(at, next - at, here, here + line.thick - 1, paint);
-                if (here !== before)
+                if (here !== before && !(line.dashed && at % 12 >= 8))
                     this.fill(
                         at, line.thick, Math.min(here, before),
                         Math.max(here, before) + line.thick - 1, paint);

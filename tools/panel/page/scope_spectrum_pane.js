@@ -2,7 +2,7 @@
 // The amplitude spectrum below the traces of the scope: of the selected channel, in dB below its
 // largest line, over a logarithmic axis of frequencies.
 import {colour, h, number, surface} from './dom.js';
-import {write} from './scope_labels.js';
+import {fitted, write} from './scope_labels.js';
 
 const range = 100, lines = 5;  // dB; of the grid
 const labelWidth = 60;         // px
@@ -38,7 +38,7 @@ export class SpectrumPane {
             found,
             tone,
             title: peak ? `${name}: ${figure(peak.frequency)} Hz, ${amplitude}` :
-                          `${name}: no spectrum, it has too few samples or does not change`
+                          `${name}: no spectrum: too few samples, or no change`
         });
         this.surface.request();
     }
@@ -58,7 +58,7 @@ export class SpectrumPane {
         if (this.found?.peak) this.paintLines(context, width, height);
         for (let i = 1; i < lines; i++)
             label(`-${range * i / lines} dB`, 4, height * i / lines - 4, dim);
-        label(this.title, 14, 14, this.tone);
+        label(fitted(context, this.title, width - 18), 14, 14, this.tone);
     }
 
     paintFrequencies(context, width, height, label) {
