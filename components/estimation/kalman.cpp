@@ -73,9 +73,14 @@ Dense measurement_covariance(const Matrices& matrices, const char* name,
     const Dense m = matrices.symmetric(name, measurements,
                                        "it has a row and a column per measurement, as C has rows",
                                        "a covariance matrix is symmetric");
-    if (!is_positive_definite(m)) {
+    if (m.diagonal().minCoeff() <= 0.0) {
         matrices.refuse(name, std::string(name) + " is not positive",
                         "give each measurement's variance on the diagonal, above 0");
+    }
+    if (!is_positive_definite(m)) {
+        matrices.refuse(name, std::string(name) + " is not positive definite",
+                        "the noise of one measurement follows from those of others; give smaller "
+                        "covariances beside the diagonal");
     }
     return m;
 }

@@ -135,7 +135,11 @@ private:
         }
         const auto real = parse_real(token);
         const double number = real.value_or(0.0);
-        if (!real || !(std::fabs(number) < 1e300)) {
+        const bool is_number = real && !std::isnan(number);
+        if (is_number && std::fabs(number) >= 1e300) {
+            report_at(at, stop, "'" + token + "' is too large",
+                      "write numbers below 1e300");
+        } else if (!is_number) {
             report_at(at, stop, "'" + token + "' is not a number",
                       "write numbers as in -1.5 or 2e-3");
         }
@@ -174,7 +178,7 @@ private:
         open_ = false;
         if (rows_.empty()) {
             report_at(current_.begin, current_.end, "'" + current_.name + "' has no numbers",
-                      "write them after the =, or in the lines below it");
+                      help_for_none());
         }
         if (diagonal_ && rows_.size() > 1) {
             report_at(current_.begin, current_.end,
@@ -187,6 +191,10 @@ private:
         }
         rows_.clear();
         found.push_back(std::move(current_));
+    }
+    const char* help_for_none() const {
+        if (diagonal_) return "write them after diag, as in: diag 1 2 3";
+        return "write them after the =, or in the lines below it";
     }
     using Row = std::vector<double>;
     static Eigen::MatrixXd diagonal_matrix(const Row& diagonal) {
