@@ -170,6 +170,13 @@ setp io.fault-emcy-storm 1
                 )
                 self.assertEqual(["a.hal"], sorted(os.listdir(self.folder)))
 
+    def test_more_values_than_a_probe_has_are_rejected_before_anything_runs(self):
+        self.write("a.hal", NETLIST + "loadrt sum2 count=900\nstart\nprint started\n")
+        self.assertRegex(
+            self.bad("sim", "a.hal", "--for", "1s", "--record", "x.mcap"),
+            r"^hal sim: --record: \d+ values are more than the 4096 that a probe can sample; name fewer\n$",
+        )
+
     def test_values_that_need_too_much_memory_name_the_option(self):
         executed = "".join(f"addf sum2.{i} fast\n" for i in range(100))
         self.write("a.hal", f"newthread fast 50000\nloadrt sum2 count=100\n{executed}start\n")

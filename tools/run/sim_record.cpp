@@ -44,6 +44,11 @@ std::int64_t shortest_period_ns(Session& session) {
     return threads.empty() ? 0 : std::ranges::min(threads, {}, &ThreadReport::period_ns).period_ns;
 }
 
+/// Returns the option whose values cannot be recorded.
+std::string option_of_values(const SimOptions& options) {
+    return options.values.empty() ? "--record: " : "--values: ";
+}
+
 int check_recording(const SimOptions& options) {
     if (!options.record.ends_with(".mcap") && !options.record.ends_with(".csv")) {
         return fail(options, fmt::format("unknown format of '{}'; name the file .mcap or .csv",
@@ -57,7 +62,7 @@ int check_recording(const SimOptions& options) {
         return fail(options, fmt::format("cannot write '{}': {}", options.record, problem));
     }
     const std::string problem = problem_of_values(options, options.values);
-    return problem.empty() ? 0 : fail(options, "--values: " + problem);
+    return problem.empty() ? 0 : fail(options, option_of_values(options) + problem);
 }
 
 std::uint64_t lost_rows(const ProbeRows& batch) {
@@ -154,7 +159,7 @@ private:
             {.names = std::move(names), .buffer_ns = step_.buffered_ns, .advice = fewer_values},
             problem);
         if (!probe_) {
-            fail(options_, "--values: " + problem);
+            fail(options_, option_of_values(options_) + problem);
             return false;
         }
         layout_ = Probes::layout(*probe_);

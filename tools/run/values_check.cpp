@@ -11,6 +11,7 @@
 #include <sys/wait.h>
 #include <system_error>
 #include <unistd.h>
+#include <utility>
 
 #include "cli/no_output.hpp"
 #include "cli/output.hpp"
@@ -29,9 +30,10 @@ std::string problem_in(Session& session, const std::vector<std::string>& values)
     const std::vector<std::string> patterns = names_in(values);
     if (session.absences().has_programs()) return "";
     if (std::string unknown = unknown_value(model, patterns); !unknown.empty()) return unknown;
+    std::vector<std::string> names = chosen_values(model, patterns);
+    if (names.empty()) return "";  // the run reports that there are none
     std::string problem;
-    session.probes().attach({.names = chosen_values(model, patterns), .advice = fewer_values},
-                            problem);
+    session.probes().attach({.names = std::move(names), .advice = fewer_values}, problem);
     return problem;
 }
 
@@ -85,7 +87,7 @@ bool can_be_loaded_twice(const NetlistOptions& options) {
 
 std::string problem_of_values(const NetlistOptions& options,
                               const std::vector<std::string>& values) {
-    if (values.empty() || !can_be_loaded_twice(options)) return "";
+    if (!can_be_loaded_twice(options)) return "";
     int ends[2];
     if (::pipe2(ends, O_CLOEXEC) != 0) return "";
     const pid_t child = ::fork();
