@@ -68,12 +68,12 @@ Failure SessionState::start(Instance& instance) {
 }
 
 void SessionState::destroy(Instance& instance) {
-    const auto faults = [this] {
+    const auto raised = [this] {
         return executor ? executor->board().outside_cycle.load(std::memory_order_relaxed) : 0;
     };
-    const std::uint64_t before = faults();
+    const std::uint64_t before = raised();
     destroy_instance(instance);
-    if (faults() == before) return;
+    if (raised() == before) return;
     failed_stops.push_back(instance.name);
 }
 
