@@ -5,7 +5,7 @@ import {on, probe, readAround, readRecording, state, subscribe} from './link.js'
 import {announce, colour, dark, h, number, pictureInterval, surface, text} from './dom.js';
 import {compareNames, similar} from './names.js';
 import {objects} from './objects.js';
-import {seconds, timeLabels, valueLabels} from './scope_axes.js';
+import {channelTitle, isStack, seconds, timeLabels, valueLabels} from './scope_axes.js';
 import {Store, Trigger, measure, valueAt} from './scope_data.js';
 import {csv, download, overwritten} from './scope_export.js';
 import {FaultTrigger, faultSource, isFaultSource, nameOfFaults} from './scope_fault_trigger.js';
@@ -800,7 +800,7 @@ export class View {
     // ---- the picture
 
     autoscale() {
-        const {channels} = this, [from, to] = this.range(), stacked = channels.length > 3;
+        const {channels} = this, [from, to] = this.range(), stacked = isStack(channels);
         const seen = channels.map(channel => measure(this.store, channel.name, from, to)),
               each = rows / Math.max(channels.length, 1);
         channels.forEach((channel, i) => {
@@ -921,7 +921,8 @@ export class View {
             [];
         const cursors = this.useCursors ? this.cursors : [];
         return [
-            base, this.zeroTime(), selected, looks.dark, width, height, ratio, ...own, ...cursors
+            base, this.zeroTime(), selected, looks.dark, width, height, ratio,
+            this.channels.length, ...own, ...cursors
         ].join(' ');
     }
 
@@ -935,10 +936,10 @@ export class View {
                     ({at, text}) =>
                         ({text, x: width * at / divisions + 4, y: height - 5, paint: dim}));
         if (channel?.scale && !channel.unknown) {
-            const own = paint(this.selected), unit = channel.unit ? ` (${channel.unit})` : '';
-            for (const {row, text} of valueLabels(channel, rows))
+            const own = paint(this.selected), title = channelTitle(channel, this.channels);
+            for (const {row, text} of isStack(this.channels) ? [] : valueLabels(channel, rows))
                 all.push({text, x: 14, y: height * row / rows - 4, paint: own});
-            all.push({text: channel.name + unit, x: 14, y: 14, paint: own});
+            all.push({text: title, x: 14, y: 14, paint: own});
         }
         if (this.useCursors)
             this.cursors.forEach(

@@ -18,6 +18,20 @@ export function label(value, size) {
     return String(Number(value.toFixed(digits(size))));
 }
 
+/// Whether channels are shown one above the other: numbers at the lines of one of them would be
+/// among the traces of the others.
+export const isStack = channels => channels.length > 3;
+
+/**
+ * The name of a channel in the picture, with what its lines mean where they have no numbers.
+ * @param {{name: string, unit?: string, scale: number}} channel
+ * @param {unknown[]} channels
+ */
+export function channelTitle({name, unit, scale}, channels) {
+    const whole = unit ? `${name} (${unit})` : name;
+    return isStack(channels) ? `${whole}, ${label(scale, scale)} per division` : whole;
+}
+
 /**
  * The numbers of a channel at the horizontal lines, from the top.
  * @param {{scale: number, position: number}} channel
