@@ -104,7 +104,7 @@ std::string announcement(const PanelOptions& options, const Access& access,
     return text;
 }
 
-/// What is said of an instance that does not run, with the others to choose from.
+/// Returns the message about an instance that does not run, with the others to choose from.
 std::string not_running(const std::string& instance) {
     std::string text = fmt::format(
         "hal panel: no instance '{}' is running yet; the page shows it as soon as it runs\n",
