@@ -175,6 +175,9 @@ class NewMachine(Case):
         for name, value in (("chain-closed", "TRUE"), ("reset", "TRUE"), ("x-target", "1")):
             self.assertEqual(0, self.shell("sets", name, value).returncode)
         wait_until(lambda: self.value("x-there.out") == "TRUE", "x is there")
+        self.assertEqual("TRUE\n", self.shell("gets", "enable").stdout)
+        self.assertEqual(0, self.shell("unload", "chain").returncode)
+        wait_until(lambda: self.shell("gets", "enable").stdout == "FALSE\n", "the chain is open")
 
     def test_options_of_a_machine_are_rejected_for_a_component(self):
         for option in (("--axes", "3"), ("--bus", "none")):
