@@ -311,6 +311,23 @@ os._exit(3)
         wait_until(lambda: self.value("adder.in1") == "4", "its link is kept")
         self.assertEqual(["uc", "sum2", "threads"], self.say("list", "comp").split())
 
+    def test_the_death_of_a_program_with_outputs_is_printed_once(self):
+        machine = self.machine()
+        self.say("loadusr", "-Wn", "uc", *self.slow("uc", value="3"))
+        os.kill(self.pid("uc"), signal.SIGKILL)
+        wait_until(lambda: self.state("uc").startswith("dead"), "it is dead")
+        self.say("loadusr", "-Wn", "other", *self.slow("other"))
+        self.say("unload", "other")
+        self.say("waitusr", "-t", "60s", "other")
+        errors = self.end(machine)[1]
+        self.assertEqual(
+            [
+                "hal: component 'uc' died (SIGKILL): its outputs keep their last values, or take those "
+                "that it has declared; see: show comp uc"
+            ],
+            [line for line in errors.splitlines() if "died" in line],
+        )
+
     def test_waitusr_waits_for_a_program_that_registers_another_name(self):
         self.machine()
         self.say("loadusr", "-Wn", "other", *self.slow("other"))

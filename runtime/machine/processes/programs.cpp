@@ -6,9 +6,11 @@
 #include <charconv>
 #include <csignal>
 #include <fstream>
+#include <unistd.h>
 #include <utility>
 
 #include "execute/core.hpp"
+#include "hal/system_log.hpp"
 #include "machine/processes/address.hpp"
 #include "machine/run/running_model.hpp"
 #include "text/find_row.hpp"
@@ -414,8 +416,32 @@ void Programs::withdraw(std::uint64_t owner) {
 
 void Programs::die(Entry& entry, const std::string& how) {
     entry.die(monotonic_ns(), "since " + time_of_day() + " (" + how + ")");
+    // the end of a child follows that of its connection, and says more
+    if (!entry.running() && !entry.stopping && !ending_children_ && has_outputs(entry)) {
+        report_death(entry, how);
+    }
     children_.wake();
     notify();
+}
+
+bool Programs::has_outputs(const Entry& entry) const {
+    const Instance* const instance = model_.instance_of(entry.name);
+    return instance && std::ranges::any_of(instance->pins, [](const auto& pin) {
+        return pin->dir == HAL_DIR_OUT || pin->dir == HAL_DIR_IO;
+    });
+}
+
+/// Prints it, and adds it to the event log: what the outputs are linked to may move on.
+void Programs::report_death(const Entry& entry, const std::string& how) {
+    const std::string line = "component '" + entry.name + "' died (" + how +
+                             "): its outputs keep their last values, or take those that it has "
+                             "declared; see: show comp " +
+                             entry.name;
+    machine_.event_log().add("message", line);
+    const std::string printed = "hal: " + line + "\n";
+    if (!write_whole(STDERR_FILENO, printed)) {
+        write_system_log("hal", printed);
+    }
 }
 
 void Programs::child_ended(pid_t pid, int status) {

@@ -153,6 +153,8 @@ private:
     void start_again(Entry& entry, std::int64_t now_ns);
     pid_t spawn(const ProcessStart& start, std::string& problem);
     bool has_pins(const Entry& entry) const;
+    bool has_outputs(const Entry& entry) const;
+    void report_death(const Entry& entry, const std::string& how);
     void remove(const Entry& entry);
     void forget(Entry& entry);
     void note_name(const std::string& name);
