@@ -49,17 +49,7 @@ public:
 
     /// One cycle. A reversal stops the drive first.
     Outputs step(const Inputs& in, const Feedback& feedback, std::int64_t now_ns) noexcept {
-        const bool lost_speed = had_speed_ && !feedback.has_speed;
-        had_speed_ = feedback.has_speed;
-        // a trip that is not read leaves the drive commanded: the reset must not start it
-        const bool resets_unread = in.reset && !was_reset_ && !feedback.reads_fault;
-        was_reset_ = in.reset;
-        if (!feedback.is_online || feedback.is_faulty || lost_speed || resets_unread) {
-            require_edge();
-        } else if (in.run && !was_run_) {
-            may_run_ = true;
-        }
-        was_run_ = in.run;
+        follow_run(in, feedback);
         if (std::isfinite(in.speed_rpm)) {
             speed_ = in.speed_rpm;
         }
@@ -82,6 +72,21 @@ public:
     }
 
 private:
+    /// After an interruption `run` needs another rising edge.
+    void follow_run(const Inputs& in, const Feedback& feedback) noexcept {
+        const bool lost_speed = had_speed_ && !feedback.has_speed;
+        had_speed_ = feedback.has_speed;
+        // a trip that is not read leaves the drive commanded: the reset must not start it
+        const bool resets_unread = in.reset && !was_reset_ && !feedback.reads_fault;
+        was_reset_ = in.reset;
+        if (!feedback.is_online || feedback.is_faulty || lost_speed || resets_unread) {
+            require_edge();
+        } else if (in.run && !was_run_) {
+            may_run_ = true;
+        }
+        was_run_ = in.run;
+    }
+
     void choose_direction(bool runs, const Feedback& feedback) noexcept {
         wanted_ = drive_stop;
         if (runs) {

@@ -416,7 +416,7 @@ void Programs::withdraw(std::uint64_t owner) {
 
 void Programs::die(Entry& entry, const std::string& how) {
     entry.die(monotonic_ns(), "since " + time_of_day() + " (" + how + ")");
-    // the end of a child follows that of its connection, and says more
+    // the end of a child follows that of its connection, and has the reason
     if (!entry.running() && !entry.stopping && !ending_children_ && has_outputs(entry)) {
         report_death(entry, how);
     }
