@@ -5,7 +5,8 @@ import {h} from './dom.js';
 import {remember} from './place.js';
 import {timeText} from './timeline_moves.js';
 
-const kinds = ['fault', 'write', 'edit', 'rejected', 'command', 'failed', 'message', 'client', 'panel', 'machine'];
+const kinds = ['fault', 'write', 'edit', 'rejected', 'command', 'failed', 'message', 'client',
+               'panel', 'machine'];
 const kindOfMark = {
     start: 'command',
     stop: 'command'
