@@ -194,9 +194,9 @@ Json Client::State::read_hello() {
     while (fd >= 0 && in.find('\n') == std::string::npos) {
         const auto left = ceil<milliseconds>(deadline - steady_clock::now());
         pollfd ready{fd, POLLIN, 0};
-        const int events = left > 0ms ? poll(&ready, 1, static_cast<int>(left.count())) : 0;
-        if (events == 0) return nullptr;
-        if (events < 0) continue;  // interrupted
+        const int readable = left > 0ms ? poll(&ready, 1, static_cast<int>(left.count())) : 0;
+        if (readable == 0) return nullptr;
+        if (readable < 0) continue;  // interrupted
         std::array<char, 512> part;
         const ssize_t got = recv(fd, part.data(), part.size(), 0);
         if (got > 0) {
