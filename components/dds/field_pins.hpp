@@ -2,7 +2,9 @@
 // The pins of a topic.
 #pragma once
 
+#include <cmath>
 #include <cstring>
+#include <type_traits>
 
 #include "hal/any_pin.hpp"
 #include "schema.hpp"
@@ -32,6 +34,17 @@ public:
             const auto value = pin.get();
             std::memcpy(to + at.offset, &value, sizeof value);
         });
+    }
+    /// Returns whether all floating-point values of an array, in the order of the fields, are
+    /// finite. [realtime]
+    bool are_finite(const hal_value* from) const noexcept {
+        bool finite = true;
+        pins_.each([&]<class T>(const Out<T>&, const At& at) {
+            if constexpr (std::is_same_v<T, double>) {
+                finite = finite && std::isfinite(from[at.field].real);
+            }
+        });
+        return finite;
     }
     /// Sets all pins from an array of values, in the order of the fields. [realtime]
     void load(const hal_value* from) noexcept {

@@ -100,6 +100,35 @@ class Topics(DdsCase):
         self.shows("2.5", "TRUE")
         self.prints("sub: topic 'arm/state' is valid again\n")
 
+    def test_a_sample_that_is_not_finite_makes_the_pins_invalid(self):
+        self.publisher(1.5)
+        self.subscriber(more="timeout_ms=5000")
+        self.shows("1.5", "TRUE")
+        for value in ("nan", "inf"):
+            self.assertEqual(
+                0, self.shell("setp", "pub.angle", value, instance="publisher").returncode
+            )
+            self.becomes("sub.valid", "FALSE")
+            self.becomes("sub.angle", "-1")
+            self.assertIn(
+                "sub: a sample of topic 'arm/state' has a value that is NaN or infinite",
+                self.shell("show", "fault", instance="subscriber").stdout,
+            )
+            self.assertGreater(int(self.value("sub.not-finite", "subscriber")), 0)
+            self.assertEqual(
+                0, self.shell("setp", "pub.angle", "2.5", instance="publisher").returncode
+            )
+            self.shows("2.5", "TRUE")
+            self.becomes("sub.valid", "TRUE")
+
+    def test_finite_0_sets_the_values_as_they_are(self):
+        self.publisher(1.5)
+        self.subscriber(more="timeout_ms=5000 finite=0")
+        self.shows("1.5", "TRUE")
+        self.assertEqual(0, self.shell("setp", "pub.angle", "inf", instance="publisher").returncode)
+        self.becomes("sub.angle", "inf")
+        self.assertEqual("TRUE", self.value("sub.valid", "subscriber"))
+
     def test_a_reliable_subscriber_loses_nothing(self):
         self.subscriber(
             more="timeout_ms=60000 depth=4000"

@@ -69,7 +69,12 @@ public:
         const Message& m = taken_;
         const std::int64_t now = cycle.start_ns();
         if (is_fresh) {
-            fields_.load(m.values.data());
+            is_finite_ = !requires_finite_ || fields_.are_finite(m.values.data());
+            if (is_finite_) {
+                fields_.load(m.values.data());
+            } else {
+                not_finite = not_finite + 1;
+            }
             // A virtual clock has another origin: then the sample counts as received now.
             constexpr std::int64_t max_wait_ns = 10'000'000'000;
             const std::int64_t waited = now - m.monotonic_ns;
@@ -87,18 +92,17 @@ public:
         if (have_) {
             age = static_cast<double>(silence + transit_) * 1e-6;
         }
-        const bool good = have_ && silence <= timeout_;
+        const bool is_recent = have_ && silence <= timeout_;
+        const bool good = is_recent && is_finite_;
         if (!good && valid) {
             fields_.make_safe();
-            const bool lacks_joint = now - sample_seen_ <= timeout_;
-            const std::string& text = lacks_joint ? joint_texts_[m.oldest_joint] : stale_text_;
-            stale_fault_.begin(faults_, this, text.c_str(), static_cast<double>(silence) * 1e-9);
+            report_invalid(is_recent, now, silence);
         }
-        if (good && stale_fault_.lasts()) {
-            stale_fault_.end(faults_, this);
+        if (good && invalid_fault_.lasts()) {
+            invalid_fault_.end(faults_, this);
         }
         valid = good;
-        const State sample_state = good ? State::valid : State::stale;
+        const State sample_state = is_recent ? State::valid : State::stale;
         state_.store(have_ ? sample_state : State::waiting, std::memory_order_relaxed);
         matched = connection_.matched_of_cycle();
         malformed = counted_.malformed(malformed_.load(std::memory_order_relaxed));
@@ -121,6 +125,16 @@ public:
         hal::journaled(taken_.values.data(), taken_.values.size());
         hal::journaled(static_cast<SampleInfo&>(taken_));
         return true;
+    }
+
+    /// Raises the fault that lasts until the topic is valid again. [realtime]
+    void report_invalid(bool is_recent, std::int64_t now, std::int64_t silence) noexcept {
+        if (is_recent) {
+            return invalid_fault_.begin(faults_, this, not_finite_text_.c_str());
+        }
+        const bool lacks_joint = now - sample_seen_ <= timeout_;
+        const std::string& text = lacks_joint ? joint_texts_[taken_.oldest_joint] : stale_text_;
+        invalid_fault_.begin(faults_, this, text.c_str(), static_cast<double>(silence) * 1e-9);
     }
 
     /// A second writer of a topic is a fault only where the values must be of one writer.
@@ -348,6 +362,14 @@ private:
         -1,
         "1: accepts one publisher, a second one is a fault; 0: accepts all; -1: 1, but 0 with ros=",
         {.min = -1, .max = 1}};
+    hal::Argument finite_argument_{
+        *this,
+        "finite",
+        -1,
+        "1: a sample with a NaN or an infinity is not valid; 0: its values are set as they are; "
+        "-1: "
+        "1, but 0 for a JointState, in which NaN stands for what a joint does not measure",
+        {.min = -1, .max = 1}};
     hal::Function take_{*this, "", &DdsSubscribe::take, "sets the pins from the newest sample"};
 
     const Schema schema_ = arguments_.schema();
@@ -365,13 +387,18 @@ private:
         "age of the sample, by the publisher's clock; infinite without one, and while the thread "
         "is stopped",
         {.initial = hal::infinite_age, .unit = "ms", .safe = hal::infinite_age}};
-    hal::Out<bool> valid{
-        *this, take_, pin::valid, "a sample was received within the timeout", {.safe = false}};
+    hal::Out<bool> valid{*this,
+                         take_,
+                         pin::valid,
+                         "a sample was received within the timeout, and its values are finite",
+                         {.safe = false}};
     hal::Out<std::uint64_t> lost{*this, take_, "lost", "gaps in the sequence numbers"};
     hal::Out<std::uint64_t> received{*this, take_, "received", "samples received"};
     hal::Out<std::uint32_t> matched{*this, take_, "matched", "matched publishers"};
     hal::Out<std::uint64_t> malformed{*this, take_, "malformed",
                                       "samples that do not match the type"};
+    hal::Out<std::uint64_t> not_finite{*this, take_, "not-finite",
+                                       "samples with a value that is NaN or infinite"};
     hal::Out<bool> wrong_type{*this, take_, "wrong-type",
                               "a publisher uses this topic with another type"};
     hal::Out<bool> silent{*this, take_, "silent",
@@ -387,20 +414,26 @@ private:
 
     // The cycle's
     const hal_faults* faults_ = nullptr;
-    hal::LastingFault stale_fault_, second_fault_;
+    hal::LastingFault invalid_fault_, second_fault_;
     std::int64_t timeout_ = 0;
     std::int64_t seen_ = 0;  // the oldest value of the newest sample
     std::int64_t sample_seen_ = 0;
     std::int64_t transit_ = 0;
     bool have_ = false;
+    bool is_finite_ = true;  // the newest sample
     Message taken_{{}, std::vector<hal_value>(schema_.fields.size())};
     Counted counted_;
     std::uint64_t others_seen_ = 0;
     std::int64_t second_until_ = INT64_MIN;
     std::string stale_text_;
+    const std::string not_finite_text_ = "a sample of topic '" + topic_.shown +
+                                         "' has a value that is NaN or infinite; its pins are not "
+                                         "valid";
     std::vector<std::string> joint_texts_;
     const bool exclusive_ =
         exclusive_argument_ == 1 || (exclusive_argument_ == -1 && schema_.ros.empty());
+    const bool requires_finite_ =
+        finite_argument_ == 1 || (finite_argument_ == -1 && schema_.names.empty());
     const std::string second_text_ =
         "a second publisher writes topic '" + topic_.shown + "'; its samples are ignored";
     // The engine's threads', one at a time
@@ -453,6 +486,10 @@ in threads that are not real-time; each cycle uses the newest complete one.
 When it becomes false, fields with `=VALUE` take this value, the others keep theirs, and a fault is
 raised. It recovers by itself. `age-ms` counts from the publisher's cycle and needs synchronised
 clocks; when they differ (`clock-differs`), it counts from the reception.
+
+A sample with a value that is NaN or infinite is not valid either: its values are not set, and
+`not-finite` counts it. With `finite=0` they are set as they are, for messages in which they have a
+meaning; that is the default for a JointState, in which NaN stands for what a joint does not measure.
 
 `lost` counts gaps in the publisher's sequence numbers. With `reliable=1` a lost sample is
 retransmitted while it is among the newest `depth` samples of the publisher and at most `depth`
