@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "vision/capture/pnm.hpp"
 
+#include <algorithm>
+
 namespace hal::vision {
 namespace {
 
@@ -62,8 +64,10 @@ struct Header {
                (colour ? 3 : 1);
     }
     std::size_t sample_bytes() const { return max > 255 ? 2 : 1; }
-    /// binary: one white space, then the samples; plain: at least a digit and a space each
-    std::size_t min_bytes() const { return plain ? 2 * samples() : 1 + samples() * sample_bytes(); }
+    /// one white space before binary samples
+    std::size_t separator_bytes() const { return plain ? 0 : 1; }
+    /// of the samples; plain: at least a digit and a space each
+    std::size_t min_bytes() const { return plain ? 2 * samples() : samples() * sample_bytes(); }
 };
 
 bool has_magic(const std::uint8_t* bytes, std::size_t count) {
@@ -71,6 +75,9 @@ bool has_magic(const std::uint8_t* bytes, std::size_t count) {
     const std::uint8_t kind = bytes[1];
     return kind == '2' || kind == '3' || kind == '5' || kind == '6';
 }
+
+/// Reader::number() reads up to 65535.
+std::string size_text(int size) { return size > 65535 ? "more than 65535" : std::to_string(size); }
 
 std::optional<Problem> read_header(Reader& reader, Header& header) {
     for (int* const value : {&header.width, &header.height, &header.max}) {
@@ -81,14 +88,15 @@ std::optional<Problem> read_header(Reader& reader, Header& header) {
         return damaged("invalid header: a value is 0, or the maximum exceeds 65535");
     }
     if (!Frame::fits(header.width, header.height)) {
-        return Problem{FrameError::too_large, "a frame of " + std::to_string(header.width) + " x " +
-                                                  std::to_string(header.height) +
-                                                  " is larger than " + std::to_string(max_width) +
-                                                  " x " + std::to_string(max_height) +
-                                                  " or 22 million pixels"};
+        return Problem{FrameError::too_large,
+                       "a frame of " + size_text(header.width) + " x " + size_text(header.height) +
+                           " is larger than " + std::to_string(max_width) + " x " +
+                           std::to_string(max_height) + " or 22 million pixels"};
     }
-    if (reader.left() < header.min_bytes()) {
-        return damaged("truncated: " + std::to_string(reader.left()) + " of " +
+    if (reader.left() < header.separator_bytes() + header.min_bytes()) {
+        const std::size_t of_samples =
+            reader.left() - std::min(reader.left(), header.separator_bytes());
+        return damaged("truncated: " + std::to_string(of_samples) + " of " +
                        std::to_string(header.min_bytes()) + " bytes");
     }
     return std::nullopt;
@@ -113,7 +121,7 @@ std::optional<Problem> read_pnm(const std::uint8_t* bytes, std::size_t count, Fr
     if (auto problem = read_header(reader, header)) return problem;
     frame.resize(header.width, header.height, header.colour ? Format::bgr : Format::grey);
     if (!header.plain) {
-        reader.take(1);
+        reader.take(header.separator_bytes());
     }
     const std::size_t samples = header.samples();
     for (std::size_t i = 0; i < samples; ++i) {
