@@ -8,6 +8,7 @@
 #include "linuxcnc/configuration.hpp"
 #include "linuxcnc/launch.hpp"
 #include "linuxcnc/leftovers.hpp"
+#include "machine/processes/programs.hpp"
 #include "run/journal_option.hpp"
 #include "run/run_journal.hpp"
 
@@ -35,6 +36,7 @@ int launch(const LinuxcncOptions& options, const Configuration& configuration, M
     hosted.max_gap_realtime_ns = configuration.max_gap_realtime_ns;
     HostedMachine machine(hosted, own_name(options), false,
                           {.sink = journal ? &journal->sink() : nullptr});
+    machine.session.programs().leave_deaths_to_caller();  // Launch reports what is done
     ::setenv("PATH", path.c_str(), 1);  // a wrapper in the configuration's bin/ has precedence
     machine.shell.note_journal_option(options.journal, options.keep_ns);
     if (!machine.serve(true)) return 1;

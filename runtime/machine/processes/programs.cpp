@@ -438,6 +438,7 @@ void Programs::report_death(const Entry& entry, const std::string& how) {
                              "declared; see: show comp " +
                              entry.name;
     machine_.event_log().add("message", line);
+    if (!prints_deaths_) return;
     const std::string printed = "hal: " + line + "\n";
     if (!write_whole(STDERR_FILENO, printed)) {
         write_system_log("hal", printed);

@@ -40,6 +40,9 @@ public:
     /// Components and pins of programs.
     ProgramModel& model() { return model_; }
 
+    /// Prints no line when a component dies: the caller watches them and reports more.
+    void leave_deaths_to_caller() { prints_deaths_ = false; }
+
     /// Starts a program. Returns its process ID, or 0 with the reason in `problem`. `waited`: the
     /// caller reads its status, then calls collect().
     pid_t start(const ProcessStart& start, bool waited, std::string& problem);
@@ -174,6 +177,7 @@ private:
     std::deque<std::string> known_names_;  // the newest first
     static constexpr std::size_t max_known_names = 256;
     bool ending_children_ = false;  // nothing is started again
+    bool prints_deaths_ = true;
     ChildProcesses children_;
 };
 
