@@ -16,7 +16,13 @@ python3 -m venv "$folder/venv" && "$folder/venv/bin/pip" install -q --disable-pi
 cd "$folder"
 cat >drive.dbc <<'DBC'
 VERSION ""
+
+NS_ :
+
+BS_:
+
 BU_: Master Drive
+
 BO_ 384 Status: 8 Drive
  SG_ Torque : 0|32@1- (1,0) [-100|100] "Nm" Master
  SG_ Position : 32|32@1- (0.001,-5) [-1000|1000] "mm" Master

@@ -57,21 +57,10 @@ class Line(Case):
         self.logs = {}
 
     def start(self, *words, **how):
-        log = self.folder / f"{len(self.logs)}.txt"
-        with open(log, "w", encoding="utf-8") as out:
-            process = subprocess.Popen(
-                ["hal", *map(str, words)],
-                executable=str(HAL),
-                cwd=self.folder,
-                env=self.environment,
-                stdin=subprocess.DEVNULL,
-                stdout=out,
-                stderr=out,
-                text=True,
-                **how,
-            )
+        log = f"{len(self.logs)}.txt"
+        process = self.start_logged(*words, log=log, **how)
         self.addCleanup(self.end, process)
-        self.logs[process] = log
+        self.logs[process] = self.folder / log
         return process
 
     @staticmethod

@@ -222,7 +222,7 @@ class Case(unittest.TestCase):
             wait_until(ready, "the machine runs")
         return machine
 
-    def start_logged(self, *words, log="node.log", mode="w"):
+    def start_logged(self, *words, log="node.log", mode="w", **how):
         """Starts `hal …` in the background with its output in a file; the test ends it."""
         output = open(self.folder / log, mode)
         self.addCleanup(output.close)
@@ -234,6 +234,7 @@ class Case(unittest.TestCase):
             stdin=subprocess.DEVNULL,
             stdout=output,
             stderr=subprocess.STDOUT,
+            **how,
         )
 
     def end(self, machine, number=signal.SIGTERM):

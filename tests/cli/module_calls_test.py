@@ -80,7 +80,7 @@ unlink 0 0, delete 0 -22, link -1, made 0
         warning = f"""{self.folder}/m.hal:3:8: warning: signal 'w' has no writer any more: its readers keep the value it has [lost-writer]
     3 | loadrt wires
       |        ^^^^^
-      = help: net w PIN gives it another writer, sets w VALUE a value
+      = help: for another writer, type: net w PIN; for another value: sets w VALUE
 
 1 warning; the edit took effect
 """

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: MIT
 """The life of programs: names that are taken and released, waiting that reports and ends, machines that are killed, programs that hang."""
 
+import contextlib
 import os
 import re
 import signal
@@ -326,6 +327,33 @@ os._exit(3)
                 "that it has declared; see: show comp uc"
             ],
             [line for line in errors.splitlines() if "died" in line],
+        )
+
+    def test_a_death_does_not_wait_for_who_reads_the_errors(self):
+        errors, full = os.pipe()
+        self.addCleanup(os.close, errors)
+        self.addCleanup(os.close, full)
+        machine = subprocess.Popen(
+            ["hal", "run", "--no-picture", self.write("machine.hal", SERVO + "start\n")],
+            executable=str(HAL),
+            cwd=self.folder,
+            env=self.environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=full,
+        )
+        self.addCleanup(machine.wait)
+        self.addCleanup(machine.kill)
+        wait_until(lambda: self.shell("list", "thread").returncode == 0, "the machine runs")
+        self.say("loadusr", "-Wn", "uc", *self.slow("uc", value="3"))
+        os.set_blocking(full, False)
+        with contextlib.suppress(BlockingIOError):
+            while True:
+                os.write(full, b"x")
+        os.set_blocking(full, True)
+        os.kill(self.pid("uc"), signal.SIGKILL)
+        wait_until(
+            lambda: self.state("uc").startswith("dead"), "it is dead, and the machine answers"
         )
 
     def test_waitusr_waits_for_a_program_that_registers_another_name(self):

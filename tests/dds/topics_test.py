@@ -100,14 +100,16 @@ class Topics(DdsCase):
         self.shows("2.5", "TRUE")
         self.prints("sub: topic 'arm/state' is valid again\n")
 
+    def publish(self, value):
+        done = self.shell("setp", "pub.angle", value, instance="publisher")
+        self.assertEqual(0, done.returncode, done.stderr)
+
     def test_a_sample_that_is_not_finite_makes_the_pins_invalid(self):
         self.publisher(1.5)
         self.subscriber(more="timeout_ms=5000")
         self.shows("1.5", "TRUE")
         for value in ("nan", "inf"):
-            self.assertEqual(
-                0, self.shell("setp", "pub.angle", value, instance="publisher").returncode
-            )
+            self.publish(value)
             self.becomes("sub.valid", "FALSE")
             self.becomes("sub.angle", "-1")
             self.assertIn(
@@ -115,9 +117,7 @@ class Topics(DdsCase):
                 self.shell("show", "fault", instance="subscriber").stdout,
             )
             self.assertGreater(int(self.value("sub.not-finite", "subscriber")), 0)
-            self.assertEqual(
-                0, self.shell("setp", "pub.angle", "2.5", instance="publisher").returncode
-            )
+            self.publish("2.5")
             self.shows("2.5", "TRUE")
             self.becomes("sub.valid", "TRUE")
 
@@ -125,7 +125,7 @@ class Topics(DdsCase):
         self.publisher(1.5)
         self.subscriber(more="timeout_ms=5000 finite=0")
         self.shows("1.5", "TRUE")
-        self.assertEqual(0, self.shell("setp", "pub.angle", "inf", instance="publisher").returncode)
+        self.publish("inf")
         self.becomes("sub.angle", "inf")
         self.assertEqual("TRUE", self.value("sub.valid", "subscriber"))
 

@@ -130,6 +130,7 @@ TEST_F(ProbeProtocol, the_journal_tells_rejected_edits_from_others) {
     run("setp nope 1");
     run("setp s.in1 4\nsetp s.in2 five\n");
     run("lock nothing");
+    run("loadusr -w false");
     EXPECT_EQ(ask({{"set", {{"s.out", 1}}}})["ok"], false);
     std::string events;
     connection.publish(connection.next_due_ns(), false, events);
@@ -137,7 +138,9 @@ TEST_F(ProbeProtocol, the_journal_tells_rejected_edits_from_others) {
     for (const char* const entry :
          {R"("kind":"rejected","text":"setp nope 1: unknown pin 'nope'")",
           R"("kind":"rejected","text":"2 edits: )", R"("kind":"rejected","text":"lock nothing: )",
-          R"("kind":"rejected","text":"setp s.out 1: )"}) {
+          R"("kind":"rejected","text":"setp s.out 1: )",
+          R"("kind":"command","text":"loadusr -w false")",
+          R"("kind":"failed","text":"loadusr -w false: 'false' )"}) {
         EXPECT_NE(events.find(entry), events.npos) << entry << "\n" << events;
     }
 }

@@ -195,6 +195,8 @@ writes them. `hal doc dds_subscribe` describes the subscriber.
     net angle  => state.angle
     net j0     => state.joint-0
 
+NaN and infinity are sent as they are; `dds_subscribe` does not accept them unless it has `finite=0`.
+
 `rate` is in samples per second; 0 is every cycle. Nothing leaves the machine without `interfaces=`.
 
 A publisher and a subscriber match when topic, type and domain are equal. Without `type=` the type

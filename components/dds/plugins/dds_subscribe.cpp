@@ -398,7 +398,7 @@ private:
     hal::Out<std::uint64_t> malformed{*this, take_, "malformed",
                                       "samples that do not match the type"};
     hal::Out<std::uint64_t> not_finite{*this, take_, "not-finite",
-                                       "samples with a value that is NaN or infinite"};
+                                       "samples that were not set: a value is NaN or infinite"};
     hal::Out<bool> wrong_type{*this, take_, "wrong-type",
                               "a publisher uses this topic with another type"};
     hal::Out<bool> silent{*this, take_, "silent",
@@ -487,8 +487,8 @@ When it becomes false, fields with `=VALUE` take this value, the others keep the
 raised. It recovers by itself. `age-ms` counts from the publisher's cycle and needs synchronised
 clocks; when they differ (`clock-differs`), it counts from the reception.
 
-A sample with a value that is NaN or infinite is not valid either: its values are not set, and
-`not-finite` counts it. With `finite=0` they are set as they are, for messages in which they have a
+A sample with a value that is NaN or infinite is not valid either: its values are not set, a fault is
+raised, and `not-finite` counts it. With `finite=0` they are set as they are, for messages in which they have a
 meaning; that is the default for a JointState, in which NaN stands for what a joint does not measure.
 
 `lost` counts gaps in the publisher's sequence numbers. With `reliable=1` a lost sample is

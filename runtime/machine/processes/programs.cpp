@@ -6,6 +6,7 @@
 #include <charconv>
 #include <csignal>
 #include <fstream>
+#include <poll.h>
 #include <unistd.h>
 #include <utility>
 
@@ -440,7 +441,10 @@ void Programs::report_death(const Entry& entry, const std::string& how) {
     machine_.event_log().add("message", line);
     if (!prints_deaths_) return;
     const std::string printed = "hal: " + line + "\n";
-    if (!write_whole(STDERR_FILENO, printed)) {
+    // the lock of the session is held: a terminal or pipe that takes nothing must not stop it
+    pollfd terminal{STDERR_FILENO, POLLOUT, 0};
+    const bool may_write = poll(&terminal, 1, 0) == 1 && (terminal.revents & POLLOUT) != 0;
+    if (!may_write || !write_whole(STDERR_FILENO, printed)) {
         write_system_log("hal", printed);
     }
 }

@@ -29,8 +29,9 @@ void check_lost_writers(const Model& model, Diagnostics& diagnostics) {
         (count == 1 ? "signal " + quoted(first->name) : "signals " + listed(names)) + ' ' +
             one_or_all(count, "has no writer any more: its readers keep the value it has",
                        "have no writer any more: their readers keep the values they have"),
-        "", "net " + first->name + " PIN gives it another writer, sets " + first->name +
-                " VALUE a value");
+        "",
+        "for another writer, type: net " + first->name + " PIN; for another value: sets " +
+            first->name + " VALUE");
 }
 
 }  // namespace hal

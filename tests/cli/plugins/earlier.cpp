@@ -13,7 +13,7 @@ namespace {
 
 constexpr const char* prefix = "EARLIER=";
 
-/// Returns the variable's text without getenv, which a journal records; nullptr: there is none.
+/// Returns the variable's text, or nullptr, without getenv, which a journal records.
 const char* earlier() {
     for (const char* const* at = environ; *at != nullptr; ++at) {
         if (std::strncmp(*at, prefix, std::strlen(prefix)) == 0) return *at + std::strlen(prefix);

@@ -159,7 +159,7 @@ bool gateway_is_lost(const EthercatValueOptions& options, const EthercatSession&
 /// The last row: for a type that nobody knows.
 const ValueType& plain_bytes() { return value_types[std::size(value_types) - 1]; }
 
-/// Returns the type of --type; nullptr after printing that there is none of this name.
+/// Returns the type of --type; nullptr after reporting an unknown name.
 const ValueType* named_type(const EthercatValueOptions& options) {
     const ValueType* const named = find_row(value_types, options.type, &ValueType::name);
     if (named == nullptr) {

@@ -1,0 +1,1 @@
+hal sim -q lost-writer-several.hal --for 1ms
