@@ -150,8 +150,7 @@ void Controller::execute(const Frame& frame, std::int64_t first_bit_ns) noexcept
 /// Keeps what the line compares with its frames.
 void Controller::update_interest() noexcept {
     FrameInterest& interest = *interest_;
-    interest.powered = powered_;
-    interest.open_ports = ports_.open();
+    interest.follow(powered_, fmmus_.can_latch(), ports_.open());
     interest.station = station_address();
     const bool has_alias = (memory_[registers::dl_alias_enable] & 1) != 0;
     interest.alias =
@@ -160,7 +159,6 @@ void Controller::update_interest() noexcept {
                            get<std::uint16_t>(&memory_[registers::ecat_event])) != 0;
     interest.first_logical = fmmus_.first_address();
     interest.end_logical = fmmus_.end_address();
-    interest.maps_registers = fmmus_.reaches_below(controller_facts::first_memory);
     interest.due_ns = due_ns_;
     const bool waits = application_ != nullptr && application_->waits();
     interest.run_ns = waits ? last_run_ns_ + controller_facts::bystander_ns : INT64_MAX;

@@ -102,6 +102,7 @@ void DistributedClock::receive_system_time(std::uint64_t received, std::size_t b
     } else {
         speed_ += (correction - speed_) / 64;
     }
+    if (correction == clock_.correction()) return;  // a clock that runs right
     clock_.set_correction(correction, now_ns);
     find_next();
 }

@@ -8,6 +8,11 @@
 
 namespace hal::ethercat::esc {
 
+static bool covers(const Fmmus::Unit& unit, std::uint32_t address) noexcept {
+    const std::uint64_t first = unit.physical_bit / 8;
+    return first <= address && address < (unit.physical_bit + unit.bits + 7) / 8;
+}
+
 void Fmmus::configure() noexcept {
     reset();
     for (unsigned n = 0; n < count_; ++n) {
@@ -29,7 +34,7 @@ void Fmmus::configure() noexcept {
         if ((u.physical_bit + u.bits + 7) / 8 > 0x10000) continue;
         first_ = std::min(first_, u.first_bit / 8);
         end_ = std::max(end_, (u.first_bit + u.bits + 7) / 8);
-        lowest_ = std::min(lowest_, u.physical_bit / 8);
+        can_latch_ |= u.writes && covers(u, registers::dc_receive_time);
         units_[used_++] = u;
     }
     const auto meet = [](const Unit& a, const Unit& b) {

@@ -31,7 +31,7 @@ public:
         used_ = 0;
         first_ = ~std::uint64_t{0};
         end_ = 0;
-        lowest_ = ~std::uint32_t{0};
+        can_latch_ = false;
         overlap_ = false;
     }
     /// Takes the settings at 0600h-06FFh.
@@ -43,8 +43,8 @@ public:
     }
     std::uint64_t first_address() const noexcept { return first_; }  ///< of the logical addresses
     std::uint64_t end_address() const noexcept { return end_; }  ///< the one behind them
-    /// Returns whether an active FMMU maps memory below an address.
-    bool reaches_below(std::uint32_t address) const noexcept { return lowest_ < address; }
+    /// Returns whether an active FMMU writes 0900h, which latches the receive times.
+    bool can_latch() const noexcept { return can_latch_; }
     const Unit* begin() const noexcept { return units_.data(); }
     const Unit* end() const noexcept { return units_.data() + used_; }
     /// Returns whether a byte is both read and written.
@@ -57,7 +57,7 @@ private:
     std::array<Unit, max> units_;  ///< active ones
     std::uint64_t first_ = ~std::uint64_t{0};
     std::uint64_t end_ = 0;
-    std::uint32_t lowest_ = ~std::uint32_t{0};  ///< physical address that is mapped
+    bool can_latch_ = false;
     bool overlap_ = false;
 };
 

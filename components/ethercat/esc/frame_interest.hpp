@@ -17,7 +17,7 @@ namespace hal::ethercat::esc {
 struct FrameInterest {
     bool powered = false;
     bool has_events = false;  ///< of 0210h that it adds to each datagram
-    bool maps_registers = false;  ///< an FMMU leads to a register
+    bool can_latch = false;  ///< a logical write can latch its receive times
     std::uint8_t open_ports = 0;  ///< a bit for each
     std::uint16_t station = 0;
     std::uint16_t alias = 0;  ///< the station address where the alias is not enabled
@@ -26,6 +26,21 @@ struct FrameInterest {
     std::uint64_t end_logical = 0;
     std::int64_t due_ns = INT64_MAX;  ///< when it has work without a frame
     std::int64_t run_ns = INT64_MAX;  ///< when its application is to run, at the next frame
+    /// of the line: the controller makes it false when a frame may go another way than before
+    bool* ways_are_known = nullptr;
+
+    /// Takes what decides the way of a frame.
+    void follow(bool has_power, bool latches, std::uint8_t open) noexcept {
+        if (powered == has_power && can_latch == latches && open_ports == open) {
+            return;
+        }
+        powered = has_power;
+        can_latch = latches;
+        open_ports = open;
+        if (ways_are_known != nullptr) {
+            *ways_are_known = false;
+        }
+    }
 };
 
 /// What the datagrams of a frame address. Read once for the whole line.
@@ -50,8 +65,10 @@ public:
     }
     /// Returns whether a controller is to note when the frame arrives at its ports. [realtime]
     bool need_arrival(const FrameInterest& slave) const noexcept {
-        return latches_ || slave.maps_registers;
+        return latches_ || slave.can_latch;
     }
+    /// Returns whether all controllers note when the frame arrives. [realtime]
+    bool latch() const noexcept { return latches_; }
 
 private:
     bool everyone_ = false;  ///< by position, by broadcast, or to all but one

@@ -11,6 +11,7 @@ namespace line_facts {
 constexpr std::int64_t smallest_frame = 60;
 constexpr std::int64_t overhead = 4;  ///< bytes; overhead: the check sequence
 constexpr std::uint16_t circulating = 0x4000;
+constexpr std::uint8_t local_address = 0x02;  ///< which the source address of a frame becomes
 /// Returns the port that follows in a controller: 0, 3, 1, 2.
 constexpr unsigned next_port(unsigned port) noexcept { return std::array{3U, 2U, 0U, 1U}[port]; }
 }  // namespace line_facts
@@ -41,6 +42,7 @@ int Line::add(SlaveOnLine slave) {
     interests_.emplace_back();
     node.interest = &interests_.back();
     node.controller->show_interest(interests_.back());
+    interests_.back().ways_are_known = &ways_are_known_;
     if (parent < 0) {
         node.cables[slave.port] = {at_end, static_cast<unsigned>(End::primary), slave.cable_ns};
         end_of(End::primary) = {number, slave.port, slave.cable_ns};
@@ -50,6 +52,10 @@ int Line::add(SlaveOnLine slave) {
                                                                               slave.cable_ns};
     }
     nodes_.push_back(std::move(node));
+    for (Way& way : ways_) {
+        way.visits.reserve(nodes_.size());
+    }
+    ways_are_known_ = false;
     update_links(static_cast<std::size_t>(number));
     return number;
 }
@@ -60,6 +66,7 @@ bool Line::close_ring(unsigned slave, unsigned port, std::int64_t cable_ns) {
     }
     nodes_[slave].cables[port] = {at_end, static_cast<unsigned>(End::secondary), cable_ns};
     end_of(End::secondary) = {static_cast<int>(slave), port, cable_ns};
+    ways_are_known_ = false;
     update_links(slave);
     return true;
 }
@@ -107,6 +114,7 @@ void Line::set_cable(std::size_t slave, unsigned port, bool connected) noexcept 
     Connection& c = nodes_[slave].cables[port];
     if (c.slave == nowhere) return;
     c.broken = !connected;
+    ways_are_known_ = false;
     if (c.slave == at_end) {
         ends_[c.port].broken = !connected;
     } else {
@@ -182,13 +190,79 @@ Line::Passage Line::process(std::span<std::uint8_t> frame, End end,
         line_facts::overhead;
     w.content = {{datagrams_.data(), count}, bytes * 8000 / speed_, number_};
     w.addresses.read(w.content.datagrams);
-    walk(w, end_of(end));
+    if (!ways_are_known_) {
+        find_ways();
+    }
+    const Way& way = ways_[static_cast<std::size_t>(end)];
+    const bool is_disturbed = disturbance_count_ != 0 || w.corrupted;
+    if (way.leads_out && w.ethercat && !is_disturbed && !w.addresses.latch()) {
+        follow(way, w);
+    } else {
+        walk(w, end_of(end));
+    }
     w.out.copies = w.copies;
     return w.out;
 }
 
+void Line::find_ways() noexcept {
+    ways_are_known_ = true;
+    for (std::size_t end = 0; end < ways_.size(); ++end) {
+        find_way(ends_[end], ways_[end]);
+    }
+}
+
+/// Finds the way that walk() takes where it only passes open ports of controllers with power.
+void Line::find_way(Connection from, Way& way) const noexcept {
+    way.visits.clear();
+    way.leads_out = false;
+    std::int64_t passed_ns = 0;
+    while (!from.broken && from.slave >= 0) {
+        passed_ns += from.delay_ns;
+        const auto slave = static_cast<std::size_t>(from.slave);
+        const Node& node = nodes_[slave];
+        const FrameInterest& interest = *node.interest;
+        if (!interest.powered || interest.can_latch || !node.is_open(from.port)) return;
+        if (from.port == 0) {
+            if (way.visits.size() == nodes_.size()) return;
+            way.visits.push_back({slave, &interest, passed_ns});
+        }
+        passed_ns += from.port == 0 ? node.processing_ns : node.forwarding_ns;
+        unsigned next = line_facts::next_port(from.port);
+        while (!node.is_open(next)) {
+            if (next == 0) return;  // it comes from behind a break
+            next = line_facts::next_port(next);
+        }
+        from = node.cables[next];
+    }
+    way.leads_out = !from.broken && from.slave == at_end;
+    way.end = static_cast<End>(from.port);
+    way.duration_ns = passed_ns + from.delay_ns;
+}
+
+/// Takes a frame along a way. Where a controller that executes it changes the way, it goes on as
+/// walk() finds it.
+void Line::follow(const Way& way, Walk& w) noexcept {
+    const std::int64_t entered_ns = w.time_ns;
+    if (!way.visits.empty()) {
+        w.frame[6] |= line_facts::local_address;
+    }
+    for (const Way::Visit& visit : way.visits) {
+        w.time_ns = entered_ns + visit.after_ns;
+        if (!w.addresses.concern(*visit.interest, w.time_ns + w.content.length_ns)) continue;
+        Node& node = nodes_[visit.slave];
+        node.controller->execute(w.content, w.time_ns);
+        if (ways_are_known_) continue;
+        w.time_ns += node.processing_ns;
+        const int out = next_open(w, visit.slave, 0);
+        if (out >= 0) {
+            walk(w, node.cables[static_cast<unsigned>(out)]);
+        }
+        return;
+    }
+    w.out = {false, way.end, entered_ns + way.duration_ns};
+}
+
 void Line::walk(Walk& w, Connection from) noexcept {
-    if (from.slave < 0) return;
     for (std::size_t hops = 0; hops < 8 * nodes_.size() + 8; ++hops) {
         if (from.broken) return;
         w.time_ns += from.delay_ns;
@@ -267,7 +341,7 @@ bool Line::pass_unit(Walk& w, std::size_t slave) noexcept {
     if (w.corrupted) {
         node.controller->error_counters().count_unit_error();
     } else if (w.ethercat) {
-        w.frame[6] |= 0x02;  // the source address becomes a local one
+        w.frame[6] |= line_facts::local_address;
         if (w.addresses.concern(*node.interest, w.time_ns + w.content.length_ns)) {
             node.controller->execute(w.content, w.time_ns);
         }
@@ -288,6 +362,12 @@ int Line::exit_of(Walk& w, std::size_t slave, unsigned port) noexcept {
     } else if (!pass_unit(w, slave)) {
         return -1;
     }
+    return next_open(w, slave, port);
+}
+
+/// Returns the next open port of a controller behind `port`, -1 if the frame is destroyed.
+int Line::next_open(Walk& w, std::size_t slave, unsigned port) noexcept {
+    const Node& node = nodes_[slave];
     for (unsigned next = line_facts::next_port(port);; next = line_facts::next_port(next)) {
         if (node.is_open(next)) return static_cast<int>(next);
         if (next != 0) continue;

@@ -20,11 +20,9 @@
 #include <vector>
 
 #include "ethercat/esc/controller.hpp"
+#include "ethercat/esc/way.hpp"
 
 namespace hal::ethercat::esc {
-
-/// The ends of a line: where a master's ports are connected.
-enum class End : std::uint8_t { primary, secondary };
 
 /// One slave to add.
 struct SlaveOnLine {
@@ -143,8 +141,6 @@ public:
 
 private:
     static constexpr int nowhere = -1;
-
-private:
     static constexpr int at_end = -2;  ///< in Connection::slave
     struct Connection {
         int slave = nowhere;
@@ -174,11 +170,17 @@ private:
     bool arrive(Walk&, int slave, unsigned port) noexcept;
     bool pass_unit(Walk&, std::size_t slave) noexcept;
     int exit_of(Walk&, std::size_t slave, unsigned port) noexcept;
+    int next_open(Walk&, std::size_t slave, unsigned port) noexcept;
     void walk(Walk&, Connection from) noexcept;
+    void follow(const Way&, Walk&) noexcept;
+    void find_ways() noexcept;
+    void find_way(Connection from, Way&) const noexcept;
 
     std::vector<Node> nodes_;
     std::deque<FrameInterest> interests_;  ///< of the nodes, close together; they stay in place
     std::array<Connection, 2> ends_;
+    std::array<Way, 2> ways_;  ///< from each end
+    bool ways_are_known_ = false;
     std::uint32_t speed_ = 100;
     std::uint64_t number_ = 0;
     struct Disturbed {
