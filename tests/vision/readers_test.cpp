@@ -136,7 +136,7 @@ TEST_F(Folder, of_frames_is_shown_in_the_order_of_names_at_its_rate) {
     const auto from = source("?fps=100");
     ASSERT_TRUE(from->open(0));
     EXPECT_EQ(at(*from, {0, 5, 10, 19, 20, 29, 30, 31}),
-              (std::vector<int>{10, -1, 20, -1, 30, -1, -2, -1}));
+              (std::vector<int>{10, -1, 20, -1, 30, -1, -3, -1}));
     EXPECT_EQ(from->problem().kind, FrameError::ended);
     EXPECT_EQ(from->problem().text,
               "all frames of " + path.string() +

@@ -76,7 +76,7 @@ public:
             } else {
                 fail(hub_->camera->problem().kind, hub_->camera->problem().text);
             }
-            if (got == Got::bad) return got;
+            if (got == Got::bad || got == Got::ended) return got;
             hub_->lost = got == Got::lost;
         }
         if (hub_->lost) {

@@ -39,6 +39,7 @@ enum class Got : std::uint8_t {
     frame,    ///< it is in `frame`
     nothing,  ///< none until the timeout
     bad,      ///< an invalid frame: problem(); the next may be valid
+    ended,    ///< no frame will follow: problem(), once
     lost,     ///< the source failed: problem(); close and reopen it
 };
 

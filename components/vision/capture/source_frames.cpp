@@ -74,7 +74,7 @@ public:
             fail(FrameError::ended, "all frames of " + shown_ +
                                         " were shown; to repeat them, write frames:" + shown_ +
                                         "?loop");
-            return Got::bad;
+            return Got::ended;
         }
         std::uint64_t newest = std::max(next_, due(now));
         if (!loop_) {

@@ -109,6 +109,9 @@ void Worker::step(std::int64_t now, bool may_wait) {
         ++status_.bad;
         report(source_->problem(), now);
         return publish();
+    case Got::ended:
+        report(source_->problem(), now);
+        return publish();
     case Got::lost:
         report(tried_again(source_->problem()), now);
         close();
