@@ -32,6 +32,12 @@ class Sim(Case):
         self.assertGreater(len((self.folder / "a.csv").read_text().splitlines()), 1000)
         self.bad("sim", path, "--for", "1s")
 
+    def test_a_recording_begins_with_the_values_that_no_thread_has(self):
+        path = self.write("a.hal", SERVO + "newsig free float\nsets free 4.5\n")
+        self.good("sim", "-q", path, "--for", "10ms", "--record", "a.csv", "--values", "free")
+        rows = (self.folder / "a.csv").read_text().splitlines()
+        self.assertEqual(["time_s,free", "0.000000000,4.5"], rows)
+
     def test_a_summary_ends_a_run_that_printed_nothing(self):
         path = self.write("a.hal", SERVO)
         done = self.run_program("sim", path, "--for", "2s")

@@ -17,9 +17,11 @@ struct RingGroup {
     const Thread* thread = nullptr;
     std::vector<std::size_t> columns;
     std::shared_ptr<plan::ProbeRing> ring;
-    /// of a group without a thread: the values of its newest row
-    std::vector<std::uint64_t> last = {};
-    std::uint64_t reported = 0;            ///< lost rows that results have named
+    // of a group without a thread:
+    std::vector<std::uint64_t> first = {};  ///< the values when the probe was attached, until taken
+    std::vector<std::uint64_t> last = {};  ///< the values of its newest row
+    std::int64_t last_ns = 0;  ///< time of that row, or of `first`
+    std::uint64_t reported = 0;  ///< lost rows that results have named
 };
 
 struct LiveProbe {
@@ -33,8 +35,8 @@ struct LiveProbe {
     };
     /// layouts before this one, until their rows have been taken
     std::vector<Ended> ended;
-    std::uint64_t announced = 1;           ///< the newest layout that a result has had
-    std::uint64_t lost = 0;                ///< in rings that are gone
+    std::uint64_t announced = 1;  ///< the newest layout that a result has had
+    std::uint64_t lost = 0;  ///< in rings that are gone
     std::int64_t until_ns = 0;
 };
 
@@ -260,6 +262,11 @@ std::shared_ptr<LiveProbe> Probes::attach(const ProbeRequest& request, std::stri
     }
     adopt(*probe, found);
     probe->until_ns = state_.executor->now_ns();
+    for (RingGroup& group : probe->groups) {
+        if (group.ring) continue;
+        group.first = look_at(*probe, group);
+        group.last_ns = probe->until_ns;
+    }
     live_.push_back(probe);
     offer();
     return probe;
@@ -350,88 +357,120 @@ std::size_t move_rows(const LiveProbe& probe, RingGroup& group, std::int64_t unt
     return rows;
 }
 
-}  // namespace
-
-std::vector<ProbeRows> Probes::take(LiveProbe& probe, std::size_t max, Rest rest) {
-    std::vector<ProbeRows> results;
-    const std::int64_t now_ns = state_.executor->now_ns();
-    // Returns the time before which no row remains.
-    const auto collect = [&](std::vector<RingGroup>& groups, ProbeRows& to, std::int64_t until_ns) {
-        std::int64_t reached_ns = until_ns;
-        for (std::size_t i = 0; i < groups.size(); ++i) {
-            RingGroup& group = groups[i];
-            if (!group.ring) continue;
-            // before the rows: a loss is named with or before the row after it
-            const std::uint64_t lost = group.ring->lost();
-            const std::size_t rows = move_rows(probe, group, until_ns, max, to.bytes);
-            if (rows > 0 || lost > group.reported) {
-                to.parts.push_back({i, rows, lost - std::exchange(group.reported, lost)});
-            }
-            if (group.ring->size() > 0) {
-                reached_ns = std::min(reached_ns, static_cast<std::int64_t>(group.ring->row(0)[1]));
-            }
+// Appends the rows of all groups before `until_ns`, as many as fit. Returns the time before which no
+// row remains.
+std::int64_t collect(const LiveProbe& probe, std::vector<RingGroup>& groups, ProbeRows& to,
+                     std::int64_t until_ns, std::size_t max) {
+    std::int64_t reached_ns = until_ns;
+    for (std::size_t i = 0; i < groups.size(); ++i) {
+        RingGroup& group = groups[i];
+        if (!group.ring) continue;
+        // before the rows: a loss is named with or before the row after it
+        const std::uint64_t lost = group.ring->lost();
+        const std::size_t rows = move_rows(probe, group, until_ns, max, to.bytes);
+        if (rows > 0 || lost > group.reported) {
+            to.parts.push_back({i, rows, lost - std::exchange(group.reported, lost)});
         }
-        return reached_ns;
-    };
-    // no rows before their layout, also of one that an edit has made and ended at once
-    const auto announce = [&probe](const ProbeLayout& layout, ProbeRows& rows) {
-        rows.layout_number = layout.number;
-        if (probe.announced == layout.number) return;
-        rows.layout = layout;
-        probe.announced = layout.number;
-    };
+        if (group.ring->size() > 0) {
+            reached_ns = std::min(reached_ns, static_cast<std::int64_t>(group.ring->row(0)[1]));
+        }
+    }
+    return reached_ns;
+}
+
+// No rows before their layout, also of one that an edit has made and ended at once.
+void announce(LiveProbe& probe, const ProbeLayout& layout, ProbeRows& rows) {
+    rows.layout_number = layout.number;
+    if (probe.announced == layout.number) return;
+    rows.layout = layout;
+    probe.announced = layout.number;
+}
+
+// Takes the rows of layouts before the present one. Returns whether all were taken.
+bool take_ended(LiveProbe& probe, std::size_t max, std::vector<ProbeRows>& results) {
     while (!probe.ended.empty()) {
-        auto& ended = probe.ended.front();
+        LiveProbe::Ended& ended = probe.ended.front();
         ProbeRows rows;
         rows.until_ns = probe.until_ns;
-        const bool all = collect(ended.groups, rows, INT64_MAX) == INT64_MAX;
+        const bool all = collect(probe, ended.groups, rows, INT64_MAX, max) == INT64_MAX;
         if (!rows.parts.empty()) {
-            announce(ended.layout, rows);
+            announce(probe, ended.layout, rows);
             results.push_back(std::move(rows));
         }
-        if (!all) return results;
+        if (!all) return false;
         probe.lost += lost_in(ended.groups);
         probe.ended.erase(probe.ended.begin());
     }
-    ProbeRows rows;
-    announce(probe.layout, rows);
+    return true;
+}
+
+// Returns the time before which every thread has finished its cycles.
+std::int64_t finished_until(const LiveProbe& probe, std::int64_t now_ns) {
     std::int64_t until_ns = INT64_MAX;
     for (const RingGroup& group : probe.groups) {
         if (group.ring) {
             until_ns = std::min(until_ns, std::max(group.ring->reached_ns(), now_ns - patience_ns));
         }
     }
-    until_ns = std::max(until_ns == INT64_MAX ? now_ns : until_ns, probe.until_ns);
-    const bool is_end = rest == Rest::taken;
-    const std::int64_t reached_ns = collect(probe.groups, rows, is_end ? INT64_MAX : until_ns);
+    return until_ns == INT64_MAX ? now_ns : until_ns;
+}
+
+}  // namespace
+
+std::vector<ProbeRows> Probes::take(LiveProbe& probe, std::size_t max, Rest rest) {
+    std::vector<ProbeRows> results;
+    const std::int64_t now_ns = state_.executor->now_ns();
+    if (!take_ended(probe, max, results)) return results;
+    ProbeRows rows;
+    announce(probe, probe.layout, rows);
+    const std::int64_t until_ns =
+        rest == Rest::taken ? INT64_MAX : std::max(finished_until(probe, now_ns), probe.until_ns);
+    const std::int64_t reached_ns = collect(probe, probe.groups, rows, until_ns, max);
     probe.until_ns = std::max(probe.until_ns, reached_ns == INT64_MAX ? now_ns : reached_ns);
     rows.until_ns = probe.until_ns;
     for (std::size_t i = 0; i < probe.groups.size(); ++i) {
-        RingGroup& group = probe.groups[i];
-        if (group.ring) continue;
-        std::vector<std::string> names;
-        for (const std::size_t column : group.columns) {
-            names.push_back(probe.columns[column].name);
+        if (!probe.groups[i].ring) {
+            take_values(probe, i, rows);
         }
-        const auto readings = LiveValues(state_).read(names);
-        std::vector<std::uint64_t> values;
-        for (std::size_t k = 0; k < names.size(); ++k) {
-            values.push_back(
-                readings[k] ? word(probe.columns[group.columns[k]].type, readings[k]->value.raw)
-                            : 0);
-        }
-        if (values == group.last) continue;
-        append(rows.bytes, 0);
-        append(rows.bytes,
-               static_cast<std::uint64_t>(std::max<std::int64_t>(rows.until_ns - 1, 0)));
-        for (const std::uint64_t value : values) {
-            append(rows.bytes, value);
-        }
-        group.last = std::move(values);
-        rows.parts.push_back({i, 1, 0});
     }
     results.push_back(std::move(rows));
     return results;
+}
+
+// A row for what the values were when the probe was attached, and one when they have changed.
+void Probes::take_values(LiveProbe& probe, std::size_t number, ProbeRows& to) const {
+    RingGroup& group = probe.groups[number];
+    std::size_t rows = 0;
+    const auto add = [&](std::vector<std::uint64_t> values, std::int64_t time_ns) {
+        if (values.empty() || values == group.last) return;
+        append(to.bytes, 0);
+        append(to.bytes, static_cast<std::uint64_t>(time_ns));
+        for (const std::uint64_t value : values) {
+            append(to.bytes, value);
+        }
+        group.last = std::move(values);
+        group.last_ns = time_ns;
+        ++rows;
+    };
+    add(std::exchange(group.first, {}), group.last_ns);
+    add(look_at(probe, group), std::max(to.until_ns - 1, group.last_ns));
+    if (rows > 0) {
+        to.parts.push_back({number, rows, 0});
+    }
+}
+
+std::vector<std::uint64_t> Probes::look_at(const LiveProbe& probe, const RingGroup& group) const {
+    std::vector<std::string> names;
+    for (const std::size_t column : group.columns) {
+        names.push_back(probe.columns[column].name);
+    }
+    const auto readings = LiveValues(state_).read(names);
+    std::vector<std::uint64_t> values;
+    for (std::size_t i = 0; i < names.size(); ++i) {
+        const hal_type type = probe.columns[group.columns[i]].type;
+        values.push_back(readings[i] ? word(type, readings[i]->value.raw) : 0);
+    }
+    return values;
 }
 
 }  // namespace hal

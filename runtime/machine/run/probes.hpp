@@ -18,6 +18,7 @@ namespace hal {
 struct Compiled;
 struct SessionState;
 struct LiveProbe;
+struct RingGroup;
 
 struct ProbeRequest {
     std::vector<std::string> names;      ///< pins, parameters, signals
@@ -36,7 +37,8 @@ struct ProbeColumn {
 
 /// The columns whose values one thread owns, or reads while no thread owns them.
 struct ProbeGroup {
-    /// empty: no thread reads them; they are looked at when rows are taken
+    /// empty: no thread reads them; they are looked at when the probe is attached and when rows
+    /// are taken
     std::string thread;
     std::int64_t period_ns = 0;          ///< between two rows; 0: a row when a value has changed
     std::vector<std::size_t> columns;
@@ -93,6 +95,8 @@ public:
 
 private:
     void offer();
+    void take_values(LiveProbe&, std::size_t number, ProbeRows& to) const;
+    std::vector<std::uint64_t> look_at(const LiveProbe&, const RingGroup&) const;
 
     SessionState& state_;
     std::vector<std::shared_ptr<LiveProbe>> live_;
