@@ -17,6 +17,18 @@ sii::FmmuUse fmmu_use(std::string_view name) noexcept {
     return sii::FmmuUse::unused;
 }
 
+std::string index_text(const Pdo& pdo) {
+    std::array<char, 8> digits{};
+    std::snprintf(digits.data(), digits.size(), "%04X", pdo.index);
+    return digits.data();
+}
+
+/// As in "none", "only 0" and "only 0 to 3".
+std::string count_text(std::size_t sync_managers) {
+    if (sync_managers == 0) return "none";
+    return sync_managers == 1 ? "only 0" : "only 0 to " + std::to_string(sync_managers - 1);
+}
+
 class Reader {
 public:
     explicit Reader(std::string_view text) : context_{text} {}
@@ -143,6 +155,8 @@ private:
     void process_data(const Xml& node, Device& d) {
         pdos(node, "RxPdo", d.rx);
         pdos(node, "TxPdo", d.tx);
+        unassign_unknown(node, d, d.rx);
+        unassign_unknown(node, d, d.tx);
         correct_direction(node, d, d.tx, sii::SmType::outputs, sii::SmType::inputs);
         correct_direction(node, d, d.rx, sii::SmType::inputs, sii::SmType::outputs);
         default_sync_manager(d, d.rx, sii::SmType::outputs);
@@ -229,20 +243,8 @@ private:
                     context_.number_of<std::uint16_t>(e, "Exclude", e.child_value()));
             }
             for (const Xml e : p.children("Entry")) {
-                Entry entry;
-                entry.index = context_.child<std::uint16_t>(e, "Index");
-
-                entry.sub = context_.child<std::uint8_t>(e, "SubIndex");
-                entry.bits = context_.child<std::uint16_t>(e, "BitLen");
-                entry.name = text_of(e, "Name");
-                entry.type = trimmed(e.child_value("DataType"));
-                if (entry.bits == 0) {
-                    entry.bits = static_cast<std::uint16_t>(type_bits(entry.type));
-                }
-                if (entry.bits == 0) {
-                    context_.warn(e, "the entry has no BitLen; it is ignored");
-                } else {
-                    pdo.entries.push_back(std::move(entry));
+                if (auto entry = entry_of(e)) {
+                    pdo.entries.push_back(std::move(*entry));
                 }
             }
             const bool known =
@@ -261,6 +263,29 @@ private:
             }
             to.push_back(std::move(pdo));
         }
+    }
+    /// Nothing for an entry of unknown length. The bits of an entry count, not its type: they are
+    /// what is exchanged.
+    std::optional<Entry> entry_of(const Xml& e) {
+        Entry entry;
+        entry.index = context_.child<std::uint16_t>(e, "Index");
+        entry.sub = context_.child<std::uint8_t>(e, "SubIndex");
+        entry.bits = context_.child<std::uint16_t>(e, "BitLen");
+        entry.name = text_of(e, "Name");
+        entry.type = trimmed(e.child_value("DataType"));
+        const unsigned of_type = type_bits(entry.type);
+        if (entry.bits == 0) {
+            entry.bits = static_cast<std::uint16_t>(of_type);
+        }
+        if (entry.bits == 0) {
+            context_.warn(e, "the entry has no BitLen; it is ignored");
+            return std::nullopt;
+        }
+        if (entry.index != 0 && of_type != 0 && of_type != entry.bits) {
+            context_.warn(e, "BitLen is " + std::to_string(entry.bits) + ", but " + entry.type +
+                                 " has " + std::to_string(of_type) + " bits; BitLen is used");
+        }
+        return entry;
     }
     Oversampling oversampling(const Xml& pdo) {
         Oversampling o;
@@ -310,6 +335,18 @@ private:
         }
     }
 
+    /// A PDO of a sync manager that the device does not have is not assigned.
+    void unassign_unknown(const Xml& node, const Device& d, std::vector<Pdo>& pdos) {
+        for (Pdo& pdo : pdos) {
+            if (!pdo.sync_manager || *pdo.sync_manager < d.sync_managers.size()) continue;
+            context_.warn(node, "PDO " + index_text(pdo) + " is assigned to sync manager " +
+                                    std::to_string(*pdo.sync_manager) + ", but the device has " +
+                                    count_text(d.sync_managers.size()) +
+                                    "; the PDO is not assigned by default");
+            pdo.sync_manager.reset();
+        }
+    }
+
     /// A mandatory PDO without a sync manager has the first one of its direction.
     static void default_sync_manager(const Device& d, std::vector<Pdo>& to, sii::SmType type) {
         for (Pdo& p : to) {
@@ -328,11 +365,6 @@ private:
         const auto names = [](const Pdo& pdo, std::uint16_t other) {
             return std::find(pdo.exclude.begin(), pdo.exclude.end(), other) != pdo.exclude.end();
         };
-        const auto text = [](const Pdo& pdo) {
-            std::array<char, 8> digits{};
-            std::snprintf(digits.data(), digits.size(), "%04X", pdo.index);
-            return std::string(digits.data());
-        };
         for (Pdo& pdo : pdos) {
             if (!pdo.sync_manager || pdo.mandatory) continue;
             const auto kept = std::find_if(pdos.begin(), pdos.end(), [&](const Pdo& other) {
@@ -341,9 +373,9 @@ private:
             });
             if (kept == pdos.end()) continue;
             pdo.sync_manager.reset();
-            context_.warn(node, "PDOs " + text(*kept) + " and " + text(pdo) +
+            context_.warn(node, "PDOs " + index_text(*kept) + " and " + index_text(pdo) +
                                     " exclude each other, but both are assigned by default; " +
-                                    text(pdo) + " is left out");
+                                    index_text(pdo) + " is left out");
         }
     }
 

@@ -177,6 +177,7 @@ TEST(PdoRules, A_sync_manager_has_a_largest_size) {
 TEST(PdoRules, An_entry_longer_than_its_object_is_a_warning) {
     std::string pdos = pdo("RxPdo", "Sm=\"2\"", "1600", "1");
     pdos.replace(pdos.find("<BitLen>16"), 10, "<BitLen>32");
+    pdos.replace(pdos.find("<DataType>UINT"), 14, "<DataType>UDINT");
     const std::string xml = device(pdos, "PdoAssign=\"1\" PdoConfig=\"1\"", dictionary(3));
     EXPECT_EQ(errors(xml, "outputs = 1600\n"), "");
     const ReadResult reading = with(xml, "outputs = 1600\n");
