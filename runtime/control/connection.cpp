@@ -274,7 +274,8 @@ std::string Connection::hello() const {
     return json_text({{"halcyon", 1},
                       {"name", state_->session.options().name},
                       {"version", paths::version},
-                      {"pid", getpid()}}) +
+                      {"pid", getpid()},
+                      {"files", state_->session.options().files}}) +
            "\n";
 }
 

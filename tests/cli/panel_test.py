@@ -370,7 +370,7 @@ class Panel(Case):
         )
         self.assertRegex(
             done.stdout,
-            r"""(?s)^warning: listening on 127\.0\.0\.2, port \d+: every computer that reaches it and has the token can read all values of instance 'default' and set them\.
+            r"""(?s)^warning: listening on 127\.0\.0\.2, port \d+: every computer that reaches it and has the token can read all values of the machines of this user and set them\.
 The connection is not encrypted: .*
 http://127\.0\.0\.2:\d+/#t=[0-9a-f]{32}
 programs and Foxglove: ws://127\.0\.0\.2:\d+/\?t=[0-9a-f]{32}

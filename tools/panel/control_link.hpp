@@ -30,6 +30,10 @@ public:
     ~ControlLink();
     ControlLink(const ControlLink&) = delete;
 
+    /// Chooses the instance; before the first retry().
+    void choose(std::string instance) { instance_ = std::move(instance); }
+    const std::string& instance() const { return instance_; }
+
     /// Tries to connect when the link is down. Call it every half second. Returns false when no
     /// instance answers.
     bool retry();

@@ -11,13 +11,15 @@
 
 namespace hal::tools {
 
-void EventLog::add(std::string_view kind, std::string_view text) {
+void EventLog::add(std::string_view kind, std::string_view text,
+                   const std::string& instance) {
     const auto unix_ms = std::chrono::duration_cast<std::chrono::milliseconds>(
                              std::chrono::system_clock::now().time_since_epoch())
                              .count();
+    const nlohmann::json event{
+        {"event", "log"}, {"unix_ms", unix_ms}, {"kind", kind}, {"text", text}};
     entries_.push_back(
-        nlohmann::json{{"event", "log"}, {"unix_ms", unix_ms}, {"kind", kind}, {"text", text}}.dump(
-            -1, ' ', false, nlohmann::json::error_handler_t::replace));
+        {instance, event.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)});
     if (entries_.size() > max_entries) {
         entries_.pop_front();
     }

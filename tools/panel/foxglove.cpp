@@ -242,7 +242,7 @@ void FoxgloveClient::set_parameters(const Json& request) {
     }
     if (!server_.access().write || !by_token_) {
         status(1, "read-only: start hal panel with --write and add the token to the address");
-    } else if (server_.controller()) {
+    } else if (server_.controller(server_.instance())) {
         status(1, "read-only: a page has control");
     } else {
         ask("set", {{"set", values}});

@@ -17,10 +17,12 @@ struct PanelOptions : Options {
     std::uint16_t port = 8080;
     std::int64_t for_ns = -1;
     bool write = false;
+    bool only = false;      ///< pages can choose no other machine
 
     void declare(OptionSet& set) override {
         set.words("FILE", "a user panel: a .panel file, or an XML file of LinuxCNC's PyVCP", false);
         set.value("-N,--name", name, "NAME", "the instance to show");
+        set.flag("--only", only, "let pages choose no other machine of this user");
         set.value("-p,--port", port, "PORT", "TCP port (default: 8080; 0: any free port)");
         set.flag("--write", write, "allow clients with the token to set values");
         set.value(

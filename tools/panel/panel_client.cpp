@@ -5,7 +5,9 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "machine/processes/address.hpp"
 #include "panel/clock.hpp"
+#include "panel/machine_list.hpp"
 #include "panel/requests.hpp"
 #include "panel/server.hpp"
 #include "panel/user_panel.hpp"
@@ -38,6 +40,16 @@ PanelClient::PanelClient(PanelServer& server, lws* wsi, bool browser, std::uint6
 
 PanelClient::~PanelClient() { server_.release(*this); }
 
+std::string PanelClient::title() const {
+    const std::string name = fmt::format("client {}", number_);
+    return instance() == server_.instance() ? name
+                                            : fmt::format("{} at '{}'", name, instance());
+}
+
+UserPanel* PanelClient::panel() const {
+    return instance() == server_.instance() ? server_.panel() : nullptr;
+}
+
 void PanelClient::tick(std::int64_t now) {
     if (!welcome_) {
         if (now - opened_ms_ > hello_ms) {
@@ -45,9 +57,9 @@ void PanelClient::tick(std::int64_t now) {
         }
         return;
     }
-    if (beat_ms_ != 0 && server_.panel() && now - beat_ms_ > server_.panel()->timeout_ms()) {
+    if (beat_ms_ != 0 && panel() && now - beat_ms_ > panel()->timeout_ms()) {
         beat_ms_ = 0;
-        server_.panel()->page_lost();
+        panel()->page_lost();
     }
     if (link_.up() || now - retried_ms_ < retry_ms) return;
     retried_ms_ = now;
@@ -101,10 +113,13 @@ void PanelClient::finish_write(std::string_view line) {
     writes_.pop_front();
     const Json reply = Json::parse(line, nullptr, false);
     const bool good = reply.is_object() && reply.value("ok", false);
+    const std::string unknown = "?";
     for (std::size_t i = 0; i < write.names.size(); ++i) {
-        server_.log().add("write", fmt::format("client {}: {}: {} -> {}{}", number_, write.names[i],
-                                               i < write.before.size() ? write.before[i] : "?",
-                                               write.values[i], good ? "" : " failed"));
+        const std::string& before = i < write.before.size() ? write.before[i] : unknown;
+        server_.log().add("write",
+                          fmt::format("{}: {}: {} -> {}{}", title(), write.names[i], before,
+                                      write.values[i], good ? "" : " failed"),
+                          instance());
     }
 }
 
@@ -138,7 +153,8 @@ void PanelClient::message(std::string_view text, bool binary) {
             return reject(request, "read-only: another page has control; take control first");
         }
         if (request.contains("set")) return write(std::move(request));
-        server_.log().add("write", fmt::format("client {}: {}", number_, text_of(request["run"])));
+        server_.log().add("write", fmt::format("{}: {}", title(), text_of(request["run"])),
+                          instance());
     }
     if (!link_.send(text_of(request))) {
         reject(request,
@@ -158,36 +174,58 @@ void PanelClient::greet(const Json& hello) {
     if (!by_token_ && (!browser_ || !server_.access().open)) {
         return close(1008, "this connection needs the token that hal panel printed");
     }
+    if (const std::string problem = choose_machine(hello); !problem.empty()) {
+        return close(1008, problem);
+    }
     if (!server_.admit(*this)) return close(1013, "too many pages are connected");
     welcome_ = true;
     Json answer{{"event", "welcome"},
-                {"instance", server_.instance()},
+                {"instance", instance()},
+                {"own", server_.instance()},
                 {"hal", started_as()},
                 {"write", server_.access().write},
                 {"token", by_token_},
                 {"client", number_},
                 {"recordings", server_.recordings().list()}};
-    if (const UserPanel* const panel = server_.panel()) {
-        answer["panel"] = Json::parse(panel->layout());
+    if (panel()) {
+        answer["panel"] = Json::parse(panel()->layout());
     }
     send(text_of(answer));
-    for (const std::string& entry : server_.log().entries()) {
-        send(entry);
+    for (const EventLog::Entry& entry : server_.log().entries()) {
+        if (entry.instance == instance()) {
+            send(entry.event);
+        }
     }
     if (by_token_ && server_.access().write) {
         server_.offer_control(*this);
     }
     send_control();
-    if (const UserPanel* const panel = server_.panel()) {
-        send(panel->values());
+    if (panel()) {
+        send(panel()->values());
     }
-    server_.log().add("client", fmt::format("client {} connected{}", number_,
-                                            by_token_ ? " with the token" : ""));
+    if (server_.machines() && !server_.machines()->event().empty()) {
+        send(server_.machines()->event());
+    }
+    server_.log().add("client", title() + " connected" + (by_token_ ? " with the token" : ""),
+                      instance());
     tick(now_ms());
 }
 
+std::string PanelClient::choose_machine(const Json& hello) {
+    const Json wanted = hello.value("machine", Json());
+    if (wanted.is_null() || wanted == server_.instance()) return "";
+    if (!server_.machines()) {
+        return fmt::format("this hal panel shows '{}' only", server_.instance());
+    }
+    if (!wanted.is_string() || !good_instance_name(wanted.get_ref<const std::string&>())) {
+        return "invalid name of a machine";
+    }
+    link_.choose(wanted.get<std::string>());
+    return "";
+}
+
 void PanelClient::send_control() {
-    const PanelClient* const holder = server_.controller();
+    const PanelClient* const holder = server_.controller(instance());
     send(text_of({{"event", "control"},
                   {"held", holder == this},
                   {"holder", holder ? Json(holder->number()) : Json()}}));
@@ -227,7 +265,7 @@ void PanelClient::send_recording(const Json& request) {
 }
 
 void PanelClient::panel_request(const Json& request) {
-    UserPanel* const panel = server_.panel();
+    UserPanel* const panel = this->panel();
     if (!panel) return reject(request, "no user panel is loaded");
     if (!server_.controls(*this)) {
         return reject(request, "read-only: this page does not have control");

@@ -14,6 +14,7 @@
 namespace hal::tools {
 
 class PanelServer;
+class UserPanel;
 
 class PanelClient : public WebClient, ControlLink::User {
 public:
@@ -25,6 +26,10 @@ public:
     bool by_token() const override { return by_token_; }
     bool admitted() const override { return welcome_; }
     std::uint64_t number() const { return number_; }
+    /// The machine that the page shows: it has chosen one, or that of the command line.
+    const std::string& instance() const { return link_.instance(); }
+    /// Returns how the log names the page: with the machine when that is another one.
+    std::string title() const;
     /// Reports who controls the machine.
     void send_control();
 
@@ -38,6 +43,10 @@ private:
     void machine_line(std::string_view line, std::string_view payload) override;
 
     void greet(const nlohmann::json& hello);
+    /// Shows the machine that `hello` names. Returns a sentence when that cannot be.
+    std::string choose_machine(const nlohmann::json& hello);
+    /// The user panel, when it belongs to the machine that the page shows.
+    UserPanel* panel() const;
     void write(nlohmann::json request);
     void panel_request(const nlohmann::json& request);
     void send_recording(const nlohmann::json& request);

@@ -83,10 +83,11 @@ std::string announcement(const PanelOptions& options, const Access& access,
     if (!options.listen.empty()) {
         text += fmt::format(
             "warning: listening on {}, port {}: every computer that reaches it and has the token "
-            "can read all values of instance '{}'{}.\n"
+            "can read all values of {}{}.\n"
             "The connection is not encrypted: use it on a network of the machine only, or through "
             "an SSH tunnel without --listen.\n",
-            all ? "all network interfaces" : options.listen, port, instance,
+            all ? "all network interfaces" : options.listen, port,
+            options.only ? fmt::format("instance '{}'", instance) : "the machines of this user",
             options.write ? " and set them" : "");
     }
     const bool token = options.write || !access.open;
@@ -160,6 +161,9 @@ int run_panel(const PanelOptions& options) {
     }
     if (!options.words.empty()) {
         server.load(std::move(layout));
+    }
+    if (!options.only) {
+        server.offer_machines();
     }
     if (!std::filesystem::exists(found_socket(instance))) {
         write_all(STDERR_FILENO, not_running(instance));

@@ -15,6 +15,7 @@
 #include "panel/control_link.hpp"
 #include "panel/foxglove.hpp"
 #include "panel/http.hpp"
+#include "panel/machine_list.hpp"
 #include "panel/metrics.hpp"
 #include "panel/panel_client.hpp"
 #include "panel/user_panel.hpp"
@@ -188,20 +189,17 @@ struct EventLoop {
 PanelServer::PanelServer(Access access, std::string instance)
     : access_(std::move(access)),
       instance_(std::move(instance)),
+      log_(instance_),
       loop_(std::make_unique<EventLoop>()) {
-    log_.on_entry = [this](const std::string& entry) {
-        for (const auto& client : clients_) {
-            if (auto* const page = dynamic_cast<PanelClient*>(client.get());
-                page && page->admitted()) {
-                page->send(entry, false, true);
-            }
-        }
+    log_.on_entry = [this](const EventLog::Entry& entry) {
+        tell_pages(entry.event, &entry.instance);
     };
 }
 
 PanelServer::~PanelServer() {
     panel_.reset();
     metrics_.reset();
+    machines_.reset();
     log_.on_entry = nullptr;
     if (context_) {
         lws_context_destroy(context_);
@@ -243,14 +241,21 @@ int PanelServer::port() const { return lws_get_vhost_listen_port(host_); }
 
 void PanelServer::load(PanelLayout layout) {
     panel_ = std::make_unique<UserPanel>(host_, instance_, std::move(layout), log_);
-    panel_->on_values = [this](const std::string& event) {
-        for (const auto& client : clients_) {
-            if (auto* const page = dynamic_cast<PanelClient*>(client.get());
-                page && page->admitted()) {
-                page->send(event, false, true);
-            }
-        }
-    };
+    panel_->on_values = [this](const std::string& event) { tell_pages(event, &instance_); };
+}
+
+void PanelServer::offer_machines() {
+    machines_ = std::make_unique<MachineList>(host_, instance_);
+    machines_->on_change = [this](const std::string& event) { tell_pages(event); };
+}
+
+void PanelServer::tell_pages(const std::string& message, const std::string* instance) {
+    for (const auto& client : clients_) {
+        auto* const page = dynamic_cast<PanelClient*>(client.get());
+        if (!page || !page->admitted()) continue;
+        if (instance && page->instance() != *instance) continue;
+        page->send(message, false, true);
+    }
 }
 
 void PanelServer::run() {
@@ -272,40 +277,57 @@ void PanelServer::tick() {
         panel_->tick(now);
     }
     metrics_->tick(now);
+    const bool watched = std::any_of(clients_.begin(), clients_.end(), [](const auto& client) {
+        return client->admitted() && dynamic_cast<PanelClient*>(client.get());
+    });
+    if (machines_ && watched) {
+        machines_->tick(now);
+    }
 }
 
-void PanelServer::tell_control() {
+const PanelClient* PanelServer::controller(const std::string& instance) const {
+    const auto at = controllers_.find(instance);
+    return at == controllers_.end() ? nullptr : at->second;
+}
+
+bool PanelServer::controls(const PanelClient& client) const {
+    return controller(client.instance()) == &client;
+}
+
+void PanelServer::tell_control(const std::string& instance) {
     for (const auto& client : clients_) {
-        if (auto* const page = dynamic_cast<PanelClient*>(client.get()); page && page->admitted()) {
+        auto* const page = dynamic_cast<PanelClient*>(client.get());
+        if (page && page->admitted() && page->instance() == instance) {
             page->send_control();
         }
     }
 }
 
 void PanelServer::take_control(PanelClient& client) {
-    if (!access_.write || !client.by_token() || controller_ == &client) return;
-    if (panel_ && controller_) {
+    if (!access_.write || !client.by_token() || controls(client)) return;
+    const std::string& instance = client.instance();
+    if (panel_ && instance == instance_ && controller(instance)) {
         panel_->page_lost();
     }
-    controller_ = &client;
-    log_.add("client", "client " + std::to_string(client.number()) + " has control");
-    tell_control();
+    controllers_[instance] = &client;
+    log_.add("client", client.title() + " has control", instance);
+    tell_control(instance);
 }
 
 void PanelServer::offer_control(PanelClient& client) {
-    if (!controller_) {
+    if (!controller(client.instance())) {
         take_control(client);
     }
 }
 
 void PanelServer::release(PanelClient& client) {
-    if (controller_ != &client) return;
-    controller_ = nullptr;
-    if (panel_) {
+    if (!controls(client)) return;
+    controllers_.erase(client.instance());
+    if (panel_ && client.instance() == instance_) {
         panel_->page_lost();
     }
-    log_.add("client", "client " + std::to_string(client.number()) + " released control");
-    tell_control();
+    log_.add("client", client.title() + " released control", client.instance());
+    tell_control(client.instance());
 }
 
 bool PanelServer::admit(WebClient& client) {

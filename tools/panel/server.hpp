@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <string>
 #include <utility>
@@ -20,6 +21,7 @@ struct lws_vhost;
 
 namespace hal::tools {
 
+class MachineList;
 class Metrics;
 class PanelClient;
 class UserPanel;
@@ -48,11 +50,15 @@ public:
     EventLog& log() { return log_; }
     UserPanel* panel() { return panel_.get(); }
     Metrics& metrics() { return *metrics_; }
+    /// The machines that a page can choose from; nullptr: all pages show that of the command line.
+    const MachineList* machines() const { return machines_.get(); }
+    /// Lets pages choose among the machines of this user; after open().
+    void offer_machines();
     const Recordings& recordings() const { return recordings_; }
 
-    /// At most one page has control at a time.
-    const PanelClient* controller() const { return controller_; }
-    bool controls(const PanelClient& client) const { return controller_ == &client; }
+    /// At most one page at a time has control of a machine.
+    const PanelClient* controller(const std::string& instance) const;
+    bool controls(const PanelClient& client) const;
     void take_control(PanelClient& client);
     void offer_control(PanelClient& client);
     void release(PanelClient& client);
@@ -73,7 +79,9 @@ public:
     static constexpr std::size_t max_connections = 48;
 
 private:
-    void tell_control();
+    void tell_control(const std::string& instance);
+    /// Sends a live message to all pages; with `instance` to those that show it.
+    void tell_pages(const std::string& message, const std::string* instance = nullptr);
 
     Access access_;
     std::string instance_;
@@ -83,9 +91,10 @@ private:
     Recordings recordings_;
     std::unique_ptr<EventLoop> loop_;
     std::unique_ptr<Metrics> metrics_;
+    std::unique_ptr<MachineList> machines_;
     std::unique_ptr<UserPanel> panel_;
     std::vector<std::unique_ptr<WebClient>> clients_;
-    PanelClient* controller_ = nullptr;
+    std::map<std::string, PanelClient*> controllers_;  ///< by instance
     std::uint64_t numbers_ = 0;
     bool stop_ = false;
 };

@@ -27,6 +27,7 @@ SessionOptions session_options(const NetlistOptions& of, const std::string& name
     options.schedule = execution.schedule;
     options.observer = observer;
     options.name = name;
+    options.files = of.words;
     options.virtual_clock = virtual_clock;
     options.wait_limit_ns = virtual_clock ? of.cycle_limit_ns : 0;
     options.max_gap_ns = of.max_gap_ns;

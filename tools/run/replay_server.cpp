@@ -157,6 +157,7 @@ void ReplayServer::accept() {
                             {"name", name_},
                             {"version", paths::version},
                             {"pid", ::getpid()},
+                            {"files", {timeline_.file_name()}},
                             {"replay", timeline_.file_name()}}) +
                  "\n");
 }

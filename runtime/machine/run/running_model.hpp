@@ -47,6 +47,8 @@ struct SessionOptions {
     std::int64_t max_gap_ns = 0;
     std::int64_t max_gap_realtime_ns = 0;
     std::vector<std::string> plugin_path;  ///< searched first
+    /// what the command line loads, as it was typed; the control socket names it
+    std::vector<std::string> files;
     /// made before the session, and outlives it; nullptr: none
     ExitObserver* observer = nullptr;
     /// outlives the session; nullptr: the execution has no journal

@@ -4,6 +4,7 @@
 import {pauseOf, problemOf} from './banner.js';
 import {connect, on, state, tell} from './link.js';
 import {h, announce} from './dom.js';
+import {addressOf, menuOf} from './machines.js';
 import {enter, isShown, parse} from './place.js';
 import {TimeLine} from './timeline.js';
 
@@ -69,11 +70,32 @@ function roleOf({write, held, token, holder, past}) {
     return holder ? `page ${holder} has control` : 'read-only';
 }
 
+const menu = /** @type {HTMLSelectElement} */ (document.getElementById('machines'));
+let shownMenu = '';
+
+/// The menu of the machines, in the place of the name.
+function drawMenu() {
+    const rows = menuOf(state.machines, state.instance);
+    const texts = JSON.stringify(rows);
+    if (texts === shownMenu) return;  // a menu that is open would be closed
+    shownMenu = texts;
+    menu.hidden = rows.length === 0;
+    document.getElementById('machine').classList.toggle('unseen', rows.length > 0);
+    const optionOf = ({name, text, isShown}) =>
+        h('option', {value: name, selected: isShown}, text);
+    menu.replaceChildren(...rows.map(optionOf));
+}
+
+/// Shows another machine in the same view: the page begins again, with nothing of this one.
+menu.addEventListener(
+    'change', () => location.assign(addressOf(location, menu.value, state.own)));
+
 let lastBanner = '';
 function drawState() {
     document.getElementById('machine').textContent =
         state.past?.timeline?.file || state.instance || 'Halcyon';
     document.body.classList.toggle('past', state.past !== null);
+    drawMenu();
     const problem = problemOf(state), pause = problem === '' ? pauseOf(state) : '';
     const banner = document.getElementById('banner');
     banner.hidden = problem === '' && pause === '';
@@ -95,6 +117,7 @@ document.getElementById('control').addEventListener(
 new TimeLine(document.getElementById('past'));
 on('state', drawState);
 on('marks', drawState);
+on('machines', drawMenu);
 on('welcome', () => {
     drawNav();
     if (state.panel && (location.hash === '' || location.hash === '#/overview') &&

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The connection to the server: requests with replies, subscriptions that survive a restart of the
 // machine, the state of both.
+import {chosenIn} from './machines.js';
 
 const listeners = new Map();  // event -> Set of functions
 export function on(event, act) {
@@ -21,6 +22,8 @@ export const state = {
     running_ns: 0,  // machine time of the last change of `running`, 0: unknown
     faults: 0,      // not acknowledged
     instance: '',
+    own: '',       // the instance of the command line of hal panel
+    machines: [],  // those that the page can show, machines.js
     hal: 'hal',  // how the user started hal panel: './hal' in a clone
     version: '',
     pid: 0,
@@ -50,7 +53,8 @@ function takeToken() {
         sessionStorage.setItem('token', found[1]);
         const rest = location.hash.replace(found[0], '');  // no token stays in the address bar
         history.replaceState(
-            null, '', location.pathname + (rest.startsWith('#/') ? rest : '#/overview'));
+            null, '',
+            location.pathname + location.search + (rest.startsWith('#/') ? rest : '#/overview'));
     }
     return sessionStorage.getItem('token');
 }
@@ -233,6 +237,7 @@ function receive(text) {
             Object.assign(state, {
                 server: 'up',
                 instance: message.instance,
+                own: message.own,
                 hal: message.hal,
                 write: message.write,
                 token: message.token,
@@ -244,6 +249,10 @@ function receive(text) {
             break;
         case 'machine':
             machine(message);
+            break;
+        case 'machines':
+            state.machines = message.machines;
+            emit('machines');
             break;
         case 'control':
             Object.assign(state, {held: message.held, holder: message.holder});
@@ -294,10 +303,10 @@ function receiveBytes(bytes) {
 }
 
 export function connect() {
-    const token = takeToken();
+    const token = takeToken() ?? undefined, machine = chosenIn(location.search) || undefined;
     socket = new WebSocket(`ws://${location.host}/`, 'halcyon.panel.v1');
     socket.binaryType = 'arraybuffer';
-    socket.onopen = () => tell({hello: token ? {token} : {}});
+    socket.onopen = () => tell({hello: {token, machine}});
     socket.onmessage = message => {
         state.stats.messages++;
         state.stats.bytes += message.data.length ?? message.data.byteLength;
