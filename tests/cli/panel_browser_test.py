@@ -3,7 +3,9 @@
 # packages: canopen panel
 """The page of `hal panel` in headless Chromium, driven over the DevTools protocol: its views."""
 
-from harness import SERVO
+from pathlib import Path
+
+from harness import SERVO, wait_until
 from panel_page import WAVE, Page, main
 from web import start_panel
 
@@ -155,7 +157,7 @@ class Views(Page):
             "Number(document.querySelector('canvas')?.dataset.boxes) === 3 && Number(document.querySelector('canvas')?.dataset.values) >= 1"
         )
         self.browser.wait(
-            "/next\\.in0[^]*0 cycles/.test(document.querySelector('.floating').innerText)"
+            "/^next\\.in0\\n0 cycles \\(servo[^\"]*\\)$/.test(document.querySelector('.floating li')?.innerText)"
         )
         self.assertIn(
             "written by adder.out",
@@ -218,6 +220,54 @@ net position{n} axis{n}-integ.out => axis{n}-pid.feedback
         )
         self.browser.wait(f"{boxes} === 7")
         self.assertIn("group=component", self.browser.evaluate("location.hash"))
+
+    def test_the_graph_of_a_phone_is_readable_and_moves_under_fingers(self):
+        machine = Path(__file__).resolve().parents[2] / "halfiles/canopen-robot/match.hal"
+        self.start("run", str(machine), loaded=False)
+        wait_until(lambda: self.shell("show", "thread").returncode == 0, "the machine runs")
+        self.process, self.port, self.token = start_panel(self)
+        self.browser = self.kind(self)
+        self.browser.size(390, 844)
+        self.browser.call("Emulation.setTouchEmulationEnabled", enabled=True, maxTouchPoints=2)
+        self.open("graph")
+        canvas = "document.querySelector('.fill > canvas')"
+
+        def view():
+            return [float(part) for part in self.browser.evaluate(f"{canvas}.dataset.view").split()]
+
+        def touch(kind, *places):
+            points = [{"x": x, "y": y + top, "id": i} for i, (x, y) in enumerate(places)]
+            self.browser.call("Input.dispatchTouchEvent", type=kind, touchPoints=points)
+
+        self.browser.wait(f"Number({canvas}.dataset.boxes) === 38 && {canvas}.dataset.view")
+        top = self.browser.evaluate(f"{canvas}.getBoundingClientRect().top")
+        x, y, scale = view()
+        self.assertGreaterEqual(12 * scale, 11)  # px of its text
+        self.assertGreaterEqual(x, 0)
+        touch("touchStart", (200, 500))
+        touch("touchMove", (200, 450))
+        touch("touchMove", (190, 300))
+        touch("touchEnd")
+        self.browser.wait(f"{canvas}.dataset.view === '{x - 10:.3f} {y - 200:.3f} {scale:.3f}'")
+        touch("touchStart", (150, 400), (250, 400))
+        touch("touchMove", (150, 400), (350, 400))
+        touch("touchEnd")
+        self.browser.wait(f"Math.abs({canvas}.dataset.view.split(' ')[2] - {2 * scale}) < 0.01")
+        self.browser.evaluate(
+            "(() => { const i = document.querySelector('input[type=search]'); i.value = 'base.x'; i.dispatchEvent(new Event('change')); })()"
+        )
+        self.browser.wait("/written by base.x/.test(document.querySelector('.floating').innerText)")
+        self.browser.wait("location.hash.includes('expanded=base')")
+        x, y, scale = view()
+        self.assertGreaterEqual(12 * scale, 11)
+        height, touched = self.browser.evaluate(f"{canvas}.clientHeight"), set()
+        for across in range(20, 380, 20):  # one of them is in the box that the search has flown to
+            touch("touchStart", (across, 0.27 * height))
+            touch("touchEnd")
+            touched.add(self.browser.evaluate("new URLSearchParams(location.hash).get('pin') ?? ''"))
+        self.assertTrue([name for name in touched if name.startswith("base.")], touched)
+        self.browser.size(844, 390)
+        self.browser.wait(f"{canvas}.clientWidth > 600 && 12 * {canvas}.dataset.view.split(' ')[2] < 11")
 
     def test_the_scope_triggers_on_the_right_sample(self):
         self.begin(

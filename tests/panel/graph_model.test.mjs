@@ -8,6 +8,8 @@ import {
     firstBoxes,
     head,
     line,
+    listHead,
+    listLine,
     neighbourhood,
     groupId,
     groupName,
@@ -45,6 +47,33 @@ test('each instance is a box, each reader an edge', () => {
     assert.deepEqual([...boxes[1].ports.values()].map(port => port.label), ['in', 'out']);
     assert.equal(boxes[1].height, head + line + 4);
     assert.equal(edges[0].out, head + line / 2);
+});
+
+test('on a narrow screen ports are below each other, and links of two boxes are one edge', () => {
+    const all = chain(3);
+    all.set('a.0.next', {...all.get('a.0.out'), name: 'a.0.next', signal: 'more'});
+    all.set('a.1.more', {...all.get('a.1.in'), name: 'a.1.more', signal: 'more'});
+    all.set(
+        'more', {kind: 'sig', name: 'more', writer: 'a.0.next', pins: ['a.0.next', 'a.1.more']});
+    const how = {...plain, collapsed: new Set(['a.0', 'a.2']), isList: true};
+    const {boxes, edges} = build(all, how, widthOf);
+    assert.deepEqual(edges.map(({from, to, signals}) => [from, to, signals.length]), [
+        ['a.0', 'a.1', 2],
+        ['a.1', 'a.2', 1],
+    ]);
+    assert.deepEqual(boxes.map(one => one.height), [
+        listHead,
+        listHead + 3 * listLine + 4,
+        listHead
+    ]);
+    assert.deepEqual([...boxes[1].ports.values()].map(({label, input}) => [label, input]), [
+        ['in', true],
+        ['more', true],
+        ['out', false],
+    ]);
+    assert.deepEqual(
+        [...boxes[1].ports.values()].map(port => port.y),
+        [.5, 1.5, 2.5].map(at => listHead + at * listLine));
 });
 
 test('a folded group is a box, and its links are bundled', () => {

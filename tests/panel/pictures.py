@@ -129,6 +129,15 @@ class Pictures(Page):
         time.sleep(1)
         self.save("graph")
 
+    def test_phone(self):
+        self.run_machine(PENDULUM, 620, "overview")
+        self.browser.size(390, 844)
+        self.open("graph")
+        self.browser.wait("Number(document.querySelector('canvas')?.dataset.values) > 0")
+        self.until_balanced()
+        time.sleep(1)
+        self.save("phone")
+
     def test_watch(self):
         names = "arm-angle,pendulum-angle,balanced,motor-effort,arm-trajectory.maxv"
         self.run_machine(PENDULUM, 560, f"watch?names={names}")

@@ -15,13 +15,18 @@ import {
     unlinked
 } from './graph_model.js';
 import {GraphCanvas, textMeasure} from './graph_canvas.js';
+import {portrait} from './graph_portrait.js';
 import {compareNames} from './names.js';
 import {objects} from './objects.js';
 import {remember} from './place.js';
 
 const maxBoxes = 400, maxValues = 1000, maxSuggestions = 2000;
 const manyInstances = 40;  // from which number on they are grouped, if nothing was chosen
+const manyOnPhone = 8;
 const unlinkedId = 'unlinked:';
+
+/// A screen on which a drawing from left to right is too small to read.
+const narrow = matchMedia('(max-width: 45rem) and (orientation: portrait)');
 
 /// The names of a list in an address.
 const listOf = list => new Set((list ?? '').split(',').filter(name => name));
@@ -43,6 +48,7 @@ export class View {
         this.open = true;
         this.selected = query.get('pin') ?? '';
         this.collapsed = listOf(query.get('collapsed'));
+        this.expanded = listOf(query.get('expanded'));  // on a narrow screen, others are collapsed
         this.unfolded = listOf(query.get('open'));
         /** @type {ReturnType<typeof instancesOf>} */
         this.instances = new Map();
@@ -74,11 +80,14 @@ export class View {
             canvas, {select: name => this.select(name), fold: name => this.fold(name)});
         this.load();
         this.unsubscribe = on('machine', () => this.load());
+        this.turned = () => this.arrange();
+        narrow.addEventListener('change', this.turned);
     }
 
     end() {
         this.open = false;
         this.unsubscribe();
+        narrow.removeEventListener('change', this.turned);
         this.stopFollowing();
         this.drawing.end();
     }
@@ -125,7 +134,8 @@ export class View {
     /// Many instances are grouped by name, unless a neighbourhood is shown or the user chose.
     defaultGrouping(instances) {
         const isWhole = this.depth.value === '' || this.search.value === '';
-        return isWhole && instances.size > manyInstances ? 'name' : 'none';
+        const many = narrow.matches ? manyOnPhone : manyInstances;
+        return isWhole && instances.size > many ? 'name' : 'none';
     }
 
     /// Folds or unfolds a group.
@@ -170,13 +180,15 @@ export class View {
         this.unlinked = unlinked(objects).sort(compareNames);
         this.grouping.value = this.chosenGrouping || this.defaultGrouping(this.instances);
         this.groups = groupsOf(this.instances, this.grouping.value);
-        const how = {groups: this.groups, open: this.unfolded, collapsed: this.collapsed};
+        const isList = narrow.matches, collapsed = isList ? this.notExpanded() : this.collapsed;
+        const how = {groups: this.groups, open: this.unfolded, collapsed, isList};
         let graph = build(this.all, how, this.widthOf);
         const whole = graph.boxes.length;
         if (depth.value !== '' && search.value !== '')
             graph = neighbourhood(graph, search.value, Number(depth.value));
         graph = firstBoxes(graph, maxBoxes);
-        const size = clustered(graph);
+        const {drawing} = this;
+        const size = isList ? portrait(graph, drawing.readableWidth()) : clustered(graph);
         const shown = graph.boxes.length === whole ? counted(whole, 'box', 'boxes') :
                                                      `${graph.boxes.length} of ${whole} boxes`;
         text(this.note, `${shown}, ${counted(graph.edges.length, 'link')}`);
@@ -186,9 +198,13 @@ export class View {
         text(this.unlinkedButton, `${counted(this.unlinked.length, 'instance')} without links`);
         this.empty.hidden = graph.boxes.length > 0;
         text(this.empty, this.emptyText());
-        this.drawing.canvas.dataset.boxes = String(graph.boxes.length);
-        this.drawing.show(graph, size);
+        drawing.canvas.dataset.boxes = String(graph.boxes.length);
+        drawing.show(graph, size, isList);
         this.follow();
+    }
+
+    notExpanded() {
+        return new Set([...this.instances.keys()].filter(name => !this.expanded.has(name)));
     }
 
     /// Why the picture has no box.
@@ -231,11 +247,21 @@ export class View {
     /// Opens the group that hides a name.
     reveal(name) {
         const hidden = boxOf(this.drawing.graph, name);
-        if (!hidden?.members || hidden.id === name) return;
+        if (!hidden?.members || hidden.id === name) return this.expand(name);
         const object = this.all.get(name);
         const pin = object?.kind === 'sig' ? this.all.get(object.writer ?? object.pins[0]) : object;
         const group = this.groups.get(pin ? instanceOf(pin) : name);
         if (group) this.unfold(group, true);
+        this.expand(name);
+    }
+
+    /// Shows the ports of the box of a pin or a signal, on a narrow screen.
+    expand(name) {
+        const box = boxOf(this.drawing.graph, name);
+        if (!box?.isList || box.members || !box.collapsed || box.id === name) return;
+        this.expanded.add(box.id);
+        remember({expanded: [...this.expanded].join(',')});
+        this.arrange();
     }
 
     fold(name) {
@@ -244,8 +270,9 @@ export class View {
             this.unfold(group, !this.unfolded.has(group));
             return this.select(name, true);
         }
-        if (!this.collapsed.delete(name)) this.collapsed.add(name);
-        remember({collapsed: [...this.collapsed].join(',')});
+        const key = narrow.matches ? 'expanded' : 'collapsed', list = this[key];
+        if (!list.delete(name)) list.add(name);
+        remember({[key]: [...list].join(',')});
         const place = {...this.drawing.view};
         this.arrange();
         Object.assign(this.drawing.view, place);
@@ -262,7 +289,7 @@ export class View {
         this.drawing.request();
         this.details.hidden = name === '';
         if (name === '') return;
-        if (move) this.drawing.centre(name);
+        if (move) this.drawing.centre(this.placeOf(name));
         const content = [
             h('button', {'aria-label': 'close', onclick: () => this.select('')}, '×'),
             h('h2', {class: 'mono'}, this.titleOf(name))
@@ -279,6 +306,13 @@ export class View {
             content.push(h('p', {class: 'dim'}, 'no pin is linked'));
         if (box && !box.members) content.push(...this.describeBox(box));
         if (this.selected === name) this.details.replaceChildren(...content);
+    }
+
+    /// What stands for a name in the drawing: for a pin without a signal its instance.
+    placeOf(name) {
+        const object = this.all.get(name);
+        const isShown = object?.kind !== 'pin' || boxOf(this.drawing.graph, name);
+        return isShown ? name : instanceOf(object);
     }
 
     titleOf(name) {
@@ -318,14 +352,10 @@ export class View {
 
     async describeSignal(signal) {
         const value = this.drawing.values.get(signal.name) ?? signal.value;
-        const reply = await request({run: ['show', 'latency']});
-        const lines = reply.ok ?
-            reply.out.split('\n').filter(
-                l => signal.pins.some(pin => l.includes(` ${pin}`) || l.startsWith(pin)) &&
-                    l.includes(signal.name)) :
-            [];
+        const reply = await request({run: ['show', 'latency', signal.name]});
+        const lines = reply.ok && reply.status === 0 ? JSON.parse(reply.out) : [];
         const readers = signal.pins.filter(pin => pin !== signal.writer).map(pin => {
-            const found = lines.find(l => l.includes(pin));
+            const found = lines.find(l => `${l} `.includes(` ${pin} `));
             return h(
                 'li', {},
                 h('button', {class: 'mono', onclick: () => this.select(pin, true)}, pin),

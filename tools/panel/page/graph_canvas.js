@@ -2,14 +2,16 @@
 // The canvas of the graph: draws boxes and edges, pans and zooms, and reports what was clicked.
 // What is too small to read is left out: values first, then ports, and last of all names.
 import {colour, number, surface, typeColour} from './dom.js';
-import {boxOf, head, line} from './graph_model.js';
+import {boxOf, head, line, listHead, listLine} from './graph_model.js';
 
 export const font = '12px system-ui, "DejaVu Sans", sans-serif';
 
 const maxScale = 4, minScale = .03;
 const detail = {ports: .3, values: .45};  // from which scale on they are drawn
 const minText = 5;                        // px on the screen: smaller names are not drawn
-const flight = 400;                       // ms
+const readable = 11 / 12;  // scale below which the text is smaller than 11 px on the screen
+const slack = 8;           // px beside the drawing, and between a finger and what it means
+const flight = 400;        // ms
 const steps = {
     ArrowLeft: [60, 0],
     ArrowRight: [-60, 0],
@@ -38,6 +40,25 @@ function curve(context, path, back) {
     }
 }
 
+/// An edge from top to bottom, or back to the top.
+function fall(context, path) {
+    context.moveTo(...path[0]);
+    for (let i = 1; i < path.length; i++) {
+        const [x0, y0] = path[i - 1], [x1, y1] = path[i], bend = (y1 - y0) * .45;
+        context.bezierCurveTo(x0, y0 + bend, x1, y1 - bend, x1, y1);
+    }
+}
+
+/// The head of an arrow at the end of an edge that falls, or rises back.
+function arrowHead(context, path, isBack) {
+    const [x, y] = path[path.length - 1], tail = isBack ? 7 : -7;
+    context.beginPath();
+    context.moveTo(x, y);
+    context.lineTo(x - 4, y + tail);
+    context.lineTo(x + 4, y + tail);
+    context.fill();
+}
+
 /// A value in the space beside an output.
 const shortValue = value =>
     number(typeof value === 'number' ? Number(value.toPrecision(4)) : value);
@@ -57,6 +78,7 @@ export class GraphCanvas {
         this.looks = {card: '', back: '', text: '', dim: '', line: '', accent: ''};
         this.flying = 0;  // counts flights: a new one ends the one before
         this.size = {width: 1, height: 1};
+        this.isTall = false;  // from top to bottom, for a narrow screen
         this.values = new Map();
         this.selected = '';
         this.signal = '';  // of what is selected
@@ -71,18 +93,31 @@ export class GraphCanvas {
     end() { this.surface.end(); }
     request() { this.surface.request(); }
 
-    /// Shows another graph, all of it.
-    show(graph, size) {
+    /// Shows another graph, all of it. `isTall`: from its top on, as wide as the screen.
+    show(graph, size, isTall = false) {
         this.graph = graph;
         this.size = size;
+        this.isTall = isTall;
         this.view.fitted = false;
         this.request();
+    }
+
+    /// How wide a drawing may be, so that its text can be read without moving it sideways.
+    readableWidth() {
+        const width = this.canvas.clientWidth || innerWidth;
+        return (width - 2 * slack) / readable;
     }
 
     paint(context, width, height) {
         const view = this.view;
         const outdated = !view.fitted || (!view.moved && view.size !== `${width} ${height}`);
-        if (outdated && this.graph.boxes.length > 0) this.fit(width, height);
+        if (outdated && this.graph.boxes.length > 0) {
+            if (this.isTall)
+                this.begin(width, height);
+            else
+                this.fit(width, height);
+        }
+        this.state(view);
         context.translate(view.x, view.y);
         context.scale(view.scale, view.scale);
         context.font = font;
@@ -103,6 +138,12 @@ export class GraphCanvas {
                 this.drawFarTitle(context, frame);
     }
 
+    /// States in the page what is shown, for tests.
+    state({x, y, scale}) {
+        const shown = [x, y, scale].map(value => value.toFixed(3)).join(' ');
+        if (this.canvas.dataset.view !== shown) this.canvas.dataset.view = shown;
+    }
+
     drawEdges(context) {
         const thin = Math.max(1.3, .6 / this.view.scale);  // px: visible at every scale
         const bundles = this.graph.edges.filter(edge => edge.bundle);
@@ -114,25 +155,34 @@ export class GraphCanvas {
             context.globalAlpha = this.signal && !marked ? .35 : .85;
             context.setLineDash(dashed ? [5, 4] : []);
             context.beginPath();
-            curve(context, edge.path, dashed);
+            if (edge.vertical)
+                fall(context, edge.path);
+            else
+                curve(context, edge.path, dashed);
             context.stroke();
+            if (!edge.vertical) continue;
+            context.fillStyle = context.strokeStyle;
+            arrowHead(context, edge.path, edge.back);
         }
         context.globalAlpha = 1;
         context.setLineDash([]);
         if (this.view.scale < detail.ports) return;
-        for (const {signals, path} of bundles)
-            if (signals.length > 1) this.drawCount(context, signals.length, path[0]);
+        for (const {signals, path, vertical, back} of bundles) {
+            const [x, y] = path[0], down = back ? -10 : 11;
+            const at = vertical ? [x - 2, y + down] : [x, y - 9];
+            if (signals.length > 1) this.drawCount(context, signals.length, at);
+        }
     }
 
     /**
-     * The number of signals of a bundle, where it begins.
+     * The number of signals of a bundle, beside its begin.
      * @param {CanvasRenderingContext2D} context
      * @param {number} count
      * @param {number[]} at
      */
     drawCount(context, count, [x, y]) {
         context.fillStyle = this.looks.text;
-        context.fillText(String(count), x + 6, y - 9);
+        context.fillText(String(count), x + 6, y);
     }
 
     /// A title in a space of this width: as large as on the screen, as far as it fits. Not drawn
@@ -205,9 +255,10 @@ export class GraphCanvas {
         context.fillStyle = this.looks.text;
         context.font = 'bold ' + font;
         const title = `${box.collapsed ? '▸' : '▾'} ${box.title}`;
-        context.fillText(title, box.x + 6, box.y + head / 2);
+        context.fillText(title, box.x + 6, box.y + (box.isList ? listHead : head) / 2);
         context.font = font;
         if (box.collapsed) return;
+        if (box.isList) return this.drawList(context, box);
         for (const port of box.ports.values())
             this.drawPort(context, box, port);
     }
@@ -221,7 +272,27 @@ export class GraphCanvas {
         if (isSmall) return this.drawTitle(context, title, x + 8, y + height / 2, width - 16, 40);
         this.drawTitle(context, `▸ ${title}`, x + 8, y + 16, width - 16, 20);
         context.fillStyle = this.looks.dim;
-        context.fillText(`${members.size} instances`, x + 22, y + 33);
+        const count = members.size === 1 ? '1 instance' : `${members.size} instances`;
+        context.fillText(count, x + 22, y + 33);
+    }
+
+    /// Ports below each other: inputs at the left edge, outputs at the right, and values.
+    drawList(context, box) {
+        for (const {pin, label, y: down, input} of box.ports.values()) {
+            const y = box.y + down, right = box.x + box.width;
+            context.fillStyle = typeColour(pin.type);
+            context.beginPath();
+            context.arc(input ? box.x : right, y, pin.name === this.selected ? 5 : 3, 0, 7);
+            context.fill();
+            context.fillStyle = this.looks.text;
+            context.fillText(label, box.x + 8, y);
+            const value = this.values.get(pin.signal);
+            if (value === undefined) continue;
+            context.fillStyle = this.looks.dim;
+            context.textAlign = 'right';
+            context.fillText(shortValue(value), right - 9, y);
+            context.textAlign = 'left';
+        }
     }
 
     drawPort(context, box, port) {
@@ -255,6 +326,15 @@ export class GraphCanvas {
         this.request();
     }
 
+    /// Shows the top of a drawing, as wide as the screen and large enough to be read.
+    begin(width, height) {
+        const {view, size} = this, wide = width - 2 * slack;
+        view.scale = Math.max(readable, Math.min(1.2, wide / size.width));
+        view.x = Math.max(slack, (width - size.width * view.scale) / 2);
+        view.y = Math.max(2 * slack, (height - size.height * view.scale) / 2);
+        Object.assign(view, {fitted: true, moved: false, size: `${width} ${height}`});
+    }
+
     zoom(factor, x, y) {
         const view = this.view,
               scale = Math.min(maxScale, Math.max(minScale, view.scale * factor));
@@ -283,17 +363,24 @@ export class GraphCanvas {
         if (!place) return;
         const {clientWidth: width, clientHeight: height} = canvas;
         const fits = Math.min(width / (place.width + 60), height / (place.height + 60)),
-              scale = Math.min(Math.max(view.scale, .8), Math.max(fits, minScale));
-        const x = place.x + place.width / 2, y = place.y + place.height / 2;
+              near = Math.min(Math.max(view.scale, .8), Math.max(fits, minScale)),
+              scale = this.isTall ? Math.max(near, readable) : near;
+        const isWhole = this.isTall && this.size.width * scale <= width;
+        const x = isWhole ? this.size.width / 2 : place.x + place.width / 2,
+              y = place.y + place.height / 2;
         view.fitted = view.moved = true;
         if (stillness.matches) return this.look(x, y, scale);
         const from = {
             x: (width / 2 - view.x) / view.scale,
-            y: (height / 2 - view.y) / view.scale,
+            y: (height * this.middle() - view.y) / view.scale,
             scale: view.scale
         };
         this.fly(from, {x, y, scale});
     }
+
+    /// Where a place that is looked at is, from the top: the details cover the lower half of a tall
+    /// drawing.
+    middle() { return this.isTall ? .27 : .5; }
 
     /// Moves from one place to another within 400 ms.
     fly(from, to) {
@@ -315,7 +402,7 @@ export class GraphCanvas {
         Object.assign(this.view, {
             scale,
             x: this.canvas.clientWidth / 2 - x * scale,
-            y: this.canvas.clientHeight / 2 - y * scale
+            y: this.canvas.clientHeight * this.middle() - y * scale
         });
         this.request();
     }
@@ -323,16 +410,27 @@ export class GraphCanvas {
     /// What is at a place of the canvas: a pin, a box, the arrow of a box, or null.
     hit(x, y) {
         const {view} = this, gx = (x - view.x) / view.scale, gy = (y - view.y) / view.scale;
+        const near = this.isTall ? slack : 0;
         const box = this.graph.boxes.find(
-            one => gx >= one.x - 8 && gx <= one.x + one.width + 8 && gy >= one.y &&
-                gy <= one.y + one.height);
+            one => gx >= one.x - 8 && gx <= one.x + one.width + 8 && gy >= one.y - near &&
+                gy <= one.y + one.height + near);
         if (!box) return this.hitFrame(gx, gy);
+        if (box.isList) return this.hitList(box, gx, gy);
         if (box.members) return {box: box.id, arrow: gx < box.x + 20 && gy < box.y + head};
         const onPorts = !box.collapsed && gy > box.y + head, left = gx < box.x + box.width / 2;
         const port = [...box.ports.values()].find(
             one => Math.abs(gy - box.y - one.y) < line / 2 && one.input === left);
         if (onPorts && port) return {pin: port.pin.name};
         return {box: box.id, arrow: gx < box.x + 20};
+    }
+
+    /// The same in a box on a narrow screen, where a finger needs more space.
+    hitList(box, x, y) {
+        const foldable = box.members ? box.height : listHead, isHead = y < box.y + foldable;
+        if (isHead || box.collapsed) return {box: box.id, arrow: x < box.x + 32};
+        const port = [...box.ports.values()].find(
+            one => Math.abs(y - box.y - one.y) <= listLine / 2);
+        return port ? {pin: port.pin.name} : {box: box.id, arrow: false};
     }
 
     hitFrame(x, y) {

@@ -4,6 +4,9 @@ import {instanceOf} from './graph_groups.js';
 
 export const line = 17;       // px: of a port
 export const head = 24;       // px: of a box
+export const listHead = 32;   // px: the same where ports are below each other, for fingers
+export const listLine = 24;   // px: of a port there
+const valueWidth = 100;       // px: beside the name of a port there
 export const groupHead = 46;  // px: of a group that is folded: its name and size
 
 /**
@@ -25,6 +28,7 @@ export const groupHead = 46;  // px: of a group that is folded: its name and siz
  * @property {any[]} outputs pins
  * @property {Set<string>} threads
  * @property {boolean} collapsed
+ * @property {boolean} [isList] its ports are below each other, each with its value
  * @property {Map<string, Port>} ports none of a group
  * @property {number} width
  * @property {number} height
@@ -44,6 +48,7 @@ export const groupHead = 46;  // px: of a group that is folded: its name and siz
  * @property {number[][]} [path] set by the layout
  * @property {boolean} [back]
  * @property {boolean} [loop]
+ * @property {boolean} [vertical] it runs from top to bottom, or back
  */
 
 /**
@@ -77,9 +82,25 @@ function shapeGroup(box, widthOf) {
     box.height = groupHead;
 }
 
+/// Sets the size of a box whose ports are below each other, and its ports: inputs, then outputs.
+function shapeList(box, widthOf) {
+    const pins = box.collapsed ? [] : [...box.inputs, ...box.outputs];
+    const labels = pins.map(pin => widthOf(short(pin, box.id)) + valueWidth);
+    box.width = Math.max(90, widthOf(box.title) * 1.15 + 36, ...labels);
+    box.height = box.collapsed ? listHead : listHead + listLine * pins.length + 4;
+    pins.forEach((pin, i) => box.ports.set(pin.name, {
+        pin,
+        label: short(pin, box.id),
+        y: listHead + listLine * (i + .5),
+        input: i < box.inputs.length
+    }));
+}
+
 /// Sets the size of a box and its ports.
-function shape(box, widthOf) {
+function shape(box, widthOf, isList) {
+    box.isList = isList;
     if (box.members) return shapeGroup(box, widthOf);
+    if (isList) return shapeList(box, widthOf);
     const widest = pins => Math.max(0, ...pins.map(pin => widthOf(short(pin, box.id)))),
           title = widthOf(box.title) + 36;
     box.width = box.collapsed ?
@@ -99,7 +120,8 @@ function shape(box, widthOf) {
 
 /** Builds a graph from signals. */
 class Builder {
-    constructor({groups, open, collapsed}) {
+    constructor({groups, open, collapsed, isList = false}) {
+        this.isList = isList;
         this.groups = groups;
         this.open = open;
         this.collapsed = collapsed;
@@ -153,7 +175,7 @@ class Builder {
 
     link(signal, writer, pin) {
         const from = this.box(instanceOf(writer)), to = this.box(instanceOf(pin)),
-              bundle = Boolean(from.members || to.members);
+              bundle = this.isList || Boolean(from.members || to.members);
         if (from === to && bundle) return;  // inside a folded group
         const key = `${from.id} ${to.id}`;
         if (bundle && this.bundles.has(key)) return this.bundles.get(key).signals.push(signal);
@@ -177,7 +199,7 @@ class Builder {
     /** @returns {Graph} */
     graph(widthOf) {
         for (const box of this.boxes.values())
-            shape(box, widthOf);
+            shape(box, widthOf, this.isList);
         const groups = new Set([...this.boxes.values()].map(box => box.group).filter(name => name));
         return {
             boxes: [...this.boxes.values()],
@@ -195,6 +217,8 @@ class Builder {
  * @param {Map<string, string>} how.groups the group of each instance that has one
  * @param {Set<string>} how.open groups that are not folded
  * @param {Set<string>} how.collapsed boxes without their ports
+ * @param {boolean} [how.isList] for a narrow screen: ports are below each other, and all links
+ *     between two boxes are one edge
  * @param {(text: string) => number} widthOf the width of a text in px
  * @returns {Graph}
  */
