@@ -66,15 +66,18 @@ dark.addEventListener('change', () => {
 /// browser as much as its canvas is large, and the browser may run on the computer of the machine.
 export const pictureInterval = 50;
 const frame = 17;  // ms at most from requestAnimationFrame() to the frame
+const tolerance = 5;  // ms by which samples may come earlier: they are drawn when they come
 
 /// Prepares a canvas for drawing in CSS pixels at the screen's resolution; draw() is called in the
 /// next frame after request(), and after follow() when the last picture is old enough: request() is
 /// for what the user does, follow() for what the machine does. Redraws at a change of size.
-/// `opaque`: draw() paints every pixel.
+/// `opaque`: draw() paints every pixel. The canvas is then sent to the screen by itself, without
+/// the other stages of a page's frame, which cost more than the canvas: what the machine does is
+/// drawn at once, not in the next frame.
 export function surface(canvas, draw, opaque = false) {
     let asked = false, timer = 0, painted = -Infinity;
     let width = 0, height = 0;  // CSS pixels
-    const context = canvas.getContext('2d', {alpha: !opaque});
+    const context = canvas.getContext('2d', {alpha: !opaque, desynchronized: opaque});
     // The size of an element makes the browser lay out the page: it is not read in every picture.
     const measure = () => {
         width = canvas.clientWidth;
@@ -82,6 +85,8 @@ export function surface(canvas, draw, opaque = false) {
     };
     const paint = () => {
         asked = false;
+        clearTimeout(timer);
+        timer = 0;
         painted = performance.now();
         if (!canvas.isConnected) return;
         if (width === 0 || height === 0) measure();
@@ -100,13 +105,15 @@ export function surface(canvas, draw, opaque = false) {
         if (!asked) requestAnimationFrame(paint);
         asked = true;
     };
+    const next = opaque ? () => (document.hidden ? request() : paint()) : request;
+    const early = opaque ? tolerance : frame;
     const follow = () => {
         if (asked || timer !== 0) return;
-        const wait = painted + pictureInterval - frame - performance.now();
-        if (wait <= 0) return request();
+        const wait = painted + pictureInterval - early - performance.now();
+        if (wait <= 0) return next();
         timer = setTimeout(() => {
             timer = 0;
-            request();
+            next();
         }, wait);
     };
     const end = () => {

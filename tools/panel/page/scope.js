@@ -12,6 +12,7 @@ import {FaultTrigger, faultSource, isFaultSource, nameOfFaults} from './scope_fa
 import {Labels, fitted, write} from './scope_labels.js';
 import {mcap} from './scope_mcap.js';
 import {Picture} from './scope_picture.js';
+import {Roll} from './scope_roll.js';
 import {spectrum} from './scope_spectrum.js';
 import {SpectrumPane} from './scope_spectrum_pane.js';
 import {stepResponse} from './scope_step.js';
@@ -132,6 +133,9 @@ export class View {
         this.stops = [];  // s: when the functions of the machine did not run
 
         this.picture = new Picture();
+        this.roll = new Roll();
+        /** @type {import('./scope_roll.js').Back} */
+        this.rowColours = null;  // of behind()
         this.labels = new Labels();
         this.looks = {dark: null, back: '', grid: '', text: '', dim: '', bad: ''};
         this.measurements = 0;
@@ -830,13 +834,10 @@ export class View {
             };
         picture.begin(
             width, height, thick, this.looks.back, this.stopsKey(), () => this.drawGround());
-        channels.forEach((channel, i) => {
+        for (const channel of channels)
             this.chooseScale(channel);
-            this.drawZero(channel, i, thick, ratio);
-            if (i !== this.selected) this.drawChannel(channel, i, thick);
-        });
-        const top = channels[this.selected];
-        if (top) this.drawChannel(top, this.selected, 2 * thick);
+        if (!this.drawRolled(thick)) this.drawAll(thick);
+        channels.forEach((channel, i) => this.drawMarks(channel, i, thick, ratio));
         if (this.useCursors)
             for (const at of this.cursors)
                 picture.vertical(width * at, this.looks.text);
@@ -897,13 +898,91 @@ export class View {
         }
     }
 
-    /// The zero line: of the selected channel from side to side, of the others a mark at the left.
-    drawZero(channel, i, thick, ratio) {
-        const {picture, canvas} = this, row = canvas.height * (.5 - channel.position / rows);
-        if (!channel.scale || channel.unknown) return;
-        if (i === this.selected) picture.horizontal(row, this.looks.dim);
-        const from = Math.round(row) - thick;
-        picture.fill(0, Math.round(10 * ratio), from, from + 2 * thick, picture.colour(paint(i)));
+    /// The row of the zero line of a channel; null when it has none.
+    zeroRow(channel) {
+        if (!channel?.scale || channel.unknown) return null;
+        return this.canvas.height * (.5 - channel.position / rows);
+    }
+
+    /// What is above the traces of a channel: the mark of its zero line, and the trigger.
+    drawMarks(channel, i, thick, ratio) {
+        const {picture, canvas} = this, row = this.zeroRow(channel);
+        if (row !== null) {
+            const from = Math.round(row) - thick, wide = Math.round(10 * ratio);
+            picture.fill(0, wide, from, from + 2 * thick, picture.colour(paint(i)));
+        }
+        if (channel.name !== this.trigger || this.mode === 'roll' || !channel.scale) return;
+        const {zero, perUnit} = this.linesOf(channel);
+        picture.horizontal(zero - this.level * perUnit, paint(i), true);
+        picture.vertical(canvas.width * this.zeroTime() / divisions, paint(i), true);
+    }
+
+    /// The indices of the channels in the order in which they are drawn: the selected one is above.
+    order() {
+        const all = [...this.channels.keys()].filter(i => this.channels[i].scale);
+        return all.sort((a, b) => Number(a === this.selected) - Number(b === this.selected));
+    }
+
+    lineOf(i, thick) {
+        return {name: paint(i), thick: i === this.selected ? 2 * thick : thick, dashed: i >= 8};
+    }
+
+    /// The row of the value 0 of a channel, and the rows of a unit.
+    linesOf({position, scale}) {
+        const {height} = this.canvas, dy = height / rows;
+        return {zero: height / 2 - dy * position, perUnit: dy / scale};
+    }
+
+    /// Seconds of a column of pixels: a number that does not depend on the shown time.
+    columnWidth() { return this.base * divisions / this.canvas.width; }
+
+    /// Draws all traces by moving those of the last picture. Returns false when one of them has few
+    /// samples, or none in this time.
+    drawRolled(thick) {
+        const {picture, store, channels, roll} = this, [from, to] = this.range();
+        const shown = this.order().filter(i => store.place.has(channels[i].name));
+        if (!shown.every(i => picture.isDense(store, channels[i].name, from, to))) {
+            roll.forget();
+            return false;
+        }
+        const each = this.columnWidth();
+        const traces = shown.map(i => ({
+            columns: store.columns(channels[i].name, each),
+            ...this.linesOf(channels[i]),
+            line: this.lineOf(i, thick)
+        }));
+        roll.put(picture, traces, Math.floor(from / each), this.behind());
+        return true;
+    }
+
+    /// What each row has behind the traces: the grid, and the zero line of the selected channel.
+    behind() {
+        const {picture, canvas, looks} = this, zero = this.zeroRow(this.channels[this.selected]);
+        const key = [canvas.height, picture.thick, looks.dark, zero].join(' ');
+        if (this.rowColours?.key === key) return this.rowColours;
+        const all = new Uint32Array(canvas.height).fill(picture.colour(looks.back)),
+              isLine = new Uint8Array(canvas.height);
+        for (let i = 1; i < rows; i++)
+            all.fill(
+                picture.colour(looks.grid), ...picture.rowsOf(canvas.height / rows * i));
+        if (zero !== null) {
+            all.fill(picture.colour(looks.dim), ...picture.rowsOf(zero));
+            isLine.fill(1, ...picture.rowsOf(zero));
+        }
+        this.rowColours = {key, rows: all, isLine};
+        return this.rowColours;
+    }
+
+    /// Draws all traces from their samples.
+    drawAll(thick) {
+        const {picture, channels} = this, [from, to] = this.range(), each = this.columnWidth();
+        const zero = this.zeroRow(channels[this.selected]);
+        if (zero !== null) picture.horizontal(zero, this.looks.dim);
+        for (const i of this.order()) {
+            const {zero: row, perUnit} = this.linesOf(channels[i]), {name} = channels[i];
+            picture.trace(
+                this.store, name, from, to, row, perUnit, this.lineOf(i, thick), each);
+        }
     }
 
     /// The place of time 0, in divisions: the trigger, or the newest sample; outside of the picture
@@ -954,18 +1033,6 @@ export class View {
         if (seen)
             channel.scale =
                 nice(Math.max(seen.max - seen.min, Math.abs(seen.max), 1e-9) / (rows * .4));
-    }
-
-    drawChannel(channel, i, thick) {
-        if (!channel.scale) return;
-        const {picture, canvas} = this, [from, to] = this.range(), dy = canvas.height / rows;
-        const zero = canvas.height / 2 - dy * channel.position, perUnit = dy / channel.scale;
-        picture.trace(
-            this.store, channel.name, from, to, zero, perUnit,
-            {name: paint(i), thick, dashed: i >= 8});
-        if (channel.name !== this.trigger || this.mode === 'roll') return;
-        picture.horizontal(zero - this.level * perUnit, paint(i), true);
-        picture.vertical(canvas.width * this.zeroTime() / divisions, paint(i), true);
     }
 
     draw() {

@@ -47,7 +47,9 @@ class Group {
 /// Minimum and maximum of a channel in each interval of `width` seconds, kept up to date as rows
 /// arrive: what a column of pixels shows.
 class Columns {
+    static made = 0;
     constructor(group, column, width, size = 1 << 13) {
+        this.number = ++Columns.made;  // another one after each restart
         this.group = group;
         this.column = column;
         this.width = width;

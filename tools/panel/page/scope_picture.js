@@ -56,6 +56,11 @@ export class Picture {
         for (let y = 0; y < this.height; y += dotted ? 6 : this.height)
             this.fill(Math.round(x), this.thick, y, dotted ? y + 1 : this.height, paint);
     }
+    /// The first row of a horizontal line, and the first one below it, within the picture.
+    rowsOf(y) {
+        const row = Math.round(y), limit = at => Math.max(0, Math.min(this.height, at));
+        return [limit(row), limit(row + this.thick)];
+    }
     horizontal(y, name, dotted = false) {
         const paint = this.colour(name), row = Math.round(y);
         for (let x = 0; x < this.width; x += dotted ? 6 : this.width)
@@ -68,11 +73,21 @@ export class Picture {
         return Math.min(to, group.time(row) + group.hold);
     }
 
+    /// Whether a channel has so many samples that each column of pixels is a line from their
+    /// minimum to their maximum.
+    isDense(store, channel, from, to) {
+        const place = store.place.get(channel);
+        if (!place || store.isCoarse(channel, from)) return false;
+        const [group] = place, begin = Math.max(group.row(from) - 1, group.first);
+        return Math.min(group.row(to) + 1, group.count) - begin >= 2 * this.width;
+    }
+
     /// A channel. With many samples per column of pixels, a column is a line from their minimum to
     /// their maximum; with few, the trace is stairs. `line`: {name, thick, dashed}. A value is at
-    /// the row zero - value * perUnit.
-    trace(store, channel, from, to, zero, perUnit, line) {
-        const place = store.place.get(channel), each = (to - from) / this.width;
+    /// the row zero - value * perUnit. `each`: seconds of a column, which has to be the same number
+    /// in all pictures of a time base.
+    trace(store, channel, from, to, zero, perUnit, line, each = (to - from) / this.width) {
+        const place = store.place.get(channel);
         if (!place) return;
         const [group, column] = place, begin = Math.max(group.row(from) - 1, group.first),
                       end = Math.min(group.row(to) + 1, group.count),
@@ -98,11 +113,22 @@ export class Picture {
             }
             return;
         }
-        const columns = store.columns(channel, each), first = Math.floor(from / each),
-              {width, height, pixels} = this, {dashed, thick} = line,
+        const columns = store.columns(channel, each), first = Math.floor(from / each);
+        this.columnsInto(this.pixels, columns, first, 0, zero, perUnit, line);
+    }
+
+    /// Draws the columns of a channel from the column `begin` on. `first`: the interval of the
+    /// column 0.
+    columnsInto(pixels, columns, first, begin, zero, perUnit, line) {
+        const {width, height} = this, {dashed, thick} = line, paint = this.colour(line.name),
               {index, low, high, mask, newest} = columns;
         let top = NaN, bottom = NaN;
-        for (let x = 0; x < width; x++) {  // the hot loop: no calls
+        // what holds at the begin
+        for (let x = begin - 1; x > -width && top !== top; x--) {
+            const at = (first + x) & mask;
+            if (index[at] === first + x) top = bottom = Math.round(zero - low[at] * perUnit);
+        }
+        for (let x = begin; x < width; x++) {  // the hot loop: no calls
             const interval = first + x, at = interval & mask;
             if (index[at] === interval) {
                 top = Math.round(zero - high[at] * perUnit);
@@ -111,7 +137,7 @@ export class Picture {
                 continue;
             else
                 top = bottom;  // no sample in this column: the last value holds
-            if (dashed && x % 12 >= 8) continue;
+            if (dashed && interval % 12 >= 8) continue;
             const end = (bottom + thick < height ? bottom + thick : height) * width;
             for (let cell = (top > 0 ? top : 0) * width + x; cell < end; cell += width)
                 pixels[cell] = paint;
