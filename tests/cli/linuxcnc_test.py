@@ -308,7 +308,7 @@ class Linuxcnc(LinuxcncCase):
         time.sleep(0.3)
         machine.send_signal(signal.SIGTERM)
         _, err = machine.communicate(timeout=TIMEOUT)
-        self.assertEqual(0, machine.returncode)
+        self.assertEqual(0, machine.returncode, err)
         self.assertRegex(
             err,
             r"(?m)^(hal linuxcnc: servo: no CPU time for \d+ ms; the machine goes on \(\[HALCYON\]MAX_CPU_GAP 30 s\); see: hal doctor\n)+",
